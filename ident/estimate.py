@@ -1,0 +1,130 @@
+"""What an identification hands on: values with intervals, or reasons why there is none."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from data.findings import Finding
+from data.protocols import ProtocolName
+from data.recording import FloatArray
+from ident.model.friction import StribeckCurve, StribeckFriction
+from ident.model.robot import OneLinkRobot
+
+CURVE_PARAMETERS = (
+    "static_torque",
+    "coulomb_torque",
+    "stribeck_velocity",
+    "stribeck_shape",
+    "viscous_damping",
+)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter: its value with a 95 % interval, or why it is withheld.
+
+    `interval95` is None for a fixed parameter; an open end is None.
+    """
+
+    value: float | None
+    unit: str
+    stderr: float | None = None
+    interval95: tuple[float | None, float | None] | None = None
+    withheld: str | None = None
+    fixed: bool = False
+
+
+@dataclass(frozen=True)
+class RunUse:
+    """Whether a log was used, and if not, why."""
+
+    log: str
+    sha256: str
+    protocol: ProtocolName
+    used: bool
+    why: str | None = None
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """Joint covariance of the free parameters, named 'inertia', 'positive.static_torque', ..."""
+
+    names: tuple[str, ...]
+    matrix: FloatArray  # (k, k), in the product of the parameters' units
+
+
+@dataclass(frozen=True)
+class IdentifiedRobot:
+    """The fit, as robot.json holds it."""
+
+    inertia: Estimate
+    positive: Mapping[str, Estimate]  # the five of CURVE_PARAMETERS
+    negative: Mapping[str, Estimate]
+    mean: Mapping[str, Estimate]
+    torque_offset: Estimate
+    runs: tuple[RunUse, ...]
+    notes: tuple[Finding, ...]
+    covariance: Covariance
+    inertia_sources: Mapping[str, Estimate] = field(default_factory=dict)  # by protocol, for comparison
+    axis: str = "rotary"
+    simulated: bool = False
+
+    def robot(self) -> OneLinkRobot | None:
+        """The fitted asymmetric robot, or None where a parameter that it needs is withheld."""
+        if self.inertia.value is None:
+            return None
+        curves = [_curve(self.positive), _curve(self.negative)]
+        if curves[0] is None or curves[1] is None:
+            return None
+        return OneLinkRobot(self.inertia.value, StribeckFriction(positive=curves[0], negative=curves[1]))
+
+    def draws(self, n: int, generator: np.random.Generator) -> tuple[OneLinkRobot, ...]:
+        """n robots drawn from the joint normal of the estimate; draws that break a rule of the law are redrawn.
+
+        Empty where the robot itself is not identified.
+        """
+        centre = self.robot()
+        if centre is None:
+            return ()
+        names = self.covariance.names
+        centres = np.array([_value(centre, name) for name in names])
+        robots: list[OneLinkRobot] = []
+        for _ in range(100 * n):
+            if len(robots) == n:
+                break
+            drawn = generator.multivariate_normal(centres, self.covariance.matrix)
+            candidate = _replaced(centre, dict(zip(names, map(float, drawn), strict=True)))
+            if candidate is not None:
+                robots.append(candidate)
+        return tuple(robots)
+
+
+def _curve(estimates: Mapping[str, Estimate]) -> StribeckCurve | None:
+    values = {name: estimates[name].value for name in CURVE_PARAMETERS}
+    known = {name: value for name, value in values.items() if value is not None}
+    return StribeckCurve(**known) if len(known) == len(values) else None
+
+
+def _value(robot: OneLinkRobot, name: str) -> float:
+    if name == "inertia":
+        return robot.inertia
+    direction, parameter = name.split(".")
+    return float(getattr(getattr(robot.friction, direction), parameter))
+
+
+def _replaced(robot: OneLinkRobot, values: Mapping[str, float]) -> OneLinkRobot | None:
+    curves = {}
+    for direction in ("positive", "negative"):
+        own = {p: values.get(f"{direction}.{p}", _value(robot, f"{direction}.{p}")) for p in CURVE_PARAMETERS}
+        if own["coulomb_torque"] < 0 or own["static_torque"] < own["coulomb_torque"]:
+            return None
+        if own["stribeck_velocity"] <= 0 or own["stribeck_shape"] <= 0 or own["viscous_damping"] < 0:
+            return None
+        curves[direction] = StribeckCurve(**own)
+    inertia = values.get("inertia", robot.inertia)
+    if inertia <= 0:
+        return None
+    return OneLinkRobot(inertia, StribeckFriction(**curves))

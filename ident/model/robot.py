@@ -1,0 +1,27 @@
+"""The one-link robot, eq (1): J q'' + b q' = u - F_f(q').
+
+The viscous damping b stands in the curve of each direction, as Table 1 prints it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from ident.model.friction import ModelError, StribeckFriction
+
+
+@dataclass(frozen=True)
+class OneLinkRobot:
+    """An inertia under set-valued friction; also what a compensator believes the robot to be."""
+
+    inertia: float  # J [kg m^2]
+    friction: StribeckFriction
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.inertia) and self.inertia > 0):
+            raise ModelError(f"inertia is {self.inertia:g} kg m^2: J > 0 (eq 1)")
+
+    def mean(self) -> OneLinkRobot:
+        """The symmetric robot with the means of the two directions."""
+        return OneLinkRobot(inertia=self.inertia, friction=self.friction.mean())

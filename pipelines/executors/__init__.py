@@ -1,0 +1,1 @@
+"""How independent work is spread: one verb, map."""

@@ -1,0 +1,1 @@
+"""Pictures, tables and the page: they draw result values and compute nothing."""
