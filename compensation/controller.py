@@ -2,8 +2,8 @@
 
     u = u_c + u_fc,   u_c = n1 (q_r - q) - n2 v_hat,   u_fc = r F_f_hat(v_hat)
 
-The controller carries a model of the robot (its `model`): the friction that it compensates and the b and J that
-its observer uses. What the robot really is, it cannot know.
+The controller carries a model of the robot (its `model`): the friction that it compensates, and the b and J
+that its observer uses. What the robot really is, it cannot know.
 """
 
 from __future__ import annotations

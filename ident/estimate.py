@@ -24,7 +24,7 @@ CURVE_PARAMETERS = (
 
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter: its value with a 95 % interval, or why it is withheld.
+    """One parameter: its value [in `unit`] with a 95 % interval, or why it is withheld.
 
     `interval95` is None for a fixed parameter; an open end is None.
     """
@@ -53,7 +53,7 @@ class Covariance:
     """Joint covariance of the free parameters, named 'inertia', 'positive.static_torque', ..."""
 
     names: tuple[str, ...]
-    matrix: FloatArray  # (k, k), in the product of the parameters' units
+    matrix: FloatArray  # (k, k) [product of the two parameters' units]
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class IdentifiedRobot:
         return OneLinkRobot(self.inertia.value, StribeckFriction(positive=curves[0], negative=curves[1]))
 
     def draws(self, n: int, generator: np.random.Generator) -> tuple[OneLinkRobot, ...]:
-        """n robots drawn from the joint normal of the estimate; draws that break a rule of the law are redrawn.
+        """Robots drawn from the joint normal of the estimate; those that break a rule of the law are redrawn.
 
         Empty where the robot itself is not identified.
         """

@@ -45,8 +45,8 @@ class StribeckCurve:
             raise ModelError(f"coulomb_torque is {self.coulomb_torque:g} N m: F_c >= 0 (eq 3)")
         if self.static_torque < self.coulomb_torque:
             raise ModelError(
-                f"static_torque {self.static_torque:g} N m is below coulomb_torque {self.coulomb_torque:g} N m: "
-                "F_s >= F_c, or the law sticks at no torque (eq 3)"
+                f"static_torque {self.static_torque:g} N m is below "
+                f"coulomb_torque {self.coulomb_torque:g} N m: F_s >= F_c, or the law sticks at no torque (eq 3)"
             )
         if self.stribeck_velocity <= 0:
             raise ModelError(f"stribeck_velocity is {self.stribeck_velocity:g} rad/s: v_s > 0 (eq 3)")
@@ -84,7 +84,7 @@ class StribeckCurve:
 def steepest_fall_factor(shape: float) -> float:
     """eta of eq (13), for a Stribeck shape beta > 0; infinite for beta < 1.
 
-    With y = (s / v_s)^beta, -dg/ds = (dF / v_s) beta y^((beta-1)/beta) e^-y is largest at y = (beta-1)/beta.
+    With y = (s / v_s)^beta, -dg/ds = (dF / v_s) beta y^((beta-1)/beta) e^-y peaks at y = (beta-1)/beta.
     """
     if shape < 1.0:
         return math.inf

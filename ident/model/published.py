@@ -1,4 +1,4 @@
-"""What van de Wouw, Mallon and Nijmeijer (2004) printed: Table 1, the inertia, and the gains of their figures.
+"""What van de Wouw, Mallon and Nijmeijer (2004) printed: Table 1, the inertia, the gains of the figures.
 
 Only the two columns are typed. The paper's L_c = 73.07 follows from their unrounded means; the printed
 mean column, rounded to four digits, gives 72.99.
