@@ -46,7 +46,7 @@ class StribeckCurve:
         if self.static_torque < self.coulomb_torque:
             raise ModelError(
                 f"static_torque {self.static_torque:g} N m is below "
-                f"coulomb_torque {self.coulomb_torque:g} N m: F_s >= F_c, or the law sticks at no torque (eq 3)"
+                f"coulomb_torque {self.coulomb_torque:g} N m: F_s >= F_c (eq 3)"
             )
         if self.stribeck_velocity <= 0:
             raise ModelError(f"stribeck_velocity is {self.stribeck_velocity:g} rad/s: v_s > 0 (eq 3)")
@@ -91,7 +91,7 @@ def steepest_fall_factor(shape: float) -> float:
     if shape == 1.0:
         return 1.0
     y = (shape - 1.0) / shape
-    return shape * y**y * math.exp(-y)
+    return float(shape * y**y * math.exp(-y))
 
 
 @dataclass(frozen=True)
