@@ -1,0 +1,175 @@
+"""How every picture looks, and how it becomes text.
+
+A picture is a matplotlib `Figure` drawn without pyplot, so that nothing is global and nothing needs a display.
+`svg_text` writes it as SVG that is the same, byte for byte, whenever the drawn values are: the identifiers are
+salted with a constant and the date is left out. Letters are outlines, so the picture looks the same on every
+machine; its title stands in `<title>` for those who cannot see it.
+
+Colours are Okabe and Ito's (2008), which stay apart for colour-blind readers. Each has a role, and a second
+value for dark pages: `report.html` exchanges the first for the second by name (see `page.py`).
+"""
+
+from __future__ import annotations
+
+import functools
+import html
+import io
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, ParamSpec
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.figure import Figure
+
+P = ParamSpec("P")
+
+
+@dataclass(frozen=True)
+class Colour:
+    """One role: its value on white and on a dark page."""
+
+    light: str
+    dark: str
+
+
+INK: Final = "#1d2530"
+MUTED: Final = "#68737f"
+GRID: Final = "#e3e7eb"
+PAPER: Final = "#ffffff"
+BLUE: Final = "#0072b2"
+VERMILLION: Final = "#d55e00"
+GREEN: Final = "#009e73"
+PURPLE: Final = "#b0578d"
+ORANGE: Final = "#e69f00"
+SKY: Final = "#56b4e9"
+UNDER: Final = ("#9ccbe8", "#4ba3d3", "#0072b1", "#084a75")  # r < 1, the farther the paler
+OVER: Final = ("#9c3f00", "#d55e01", "#f0914a", "#f7be8f")  # r > 1, the farther the paler
+
+COLOURS: Final = {
+    "ink": Colour(INK, "#e7ebf0"),
+    "muted": Colour(MUTED, "#9ca8b4"),
+    "grid": Colour(GRID, "#323c47"),
+    "paper": Colour(PAPER, "#161b21"),
+    "blue": Colour(BLUE, "#5db7ee"),
+    "vermillion": Colour(VERMILLION, "#ff8f4d"),
+    "green": Colour(GREEN, "#35c99c"),
+    "purple": Colour(PURPLE, "#e39ac8"),
+    "orange": Colour(ORANGE, "#f2b737"),
+    "sky": Colour(SKY, "#86cbf4"),
+    "under-1": Colour(UNDER[0], "#2f5f80"),
+    "under-2": Colour(UNDER[1], "#3f8fc0"),
+    "under-3": Colour(UNDER[2], "#6fc1f2"),
+    "under-4": Colour(UNDER[3], "#b5e0fb"),
+    "over-1": Colour(OVER[0], "#ffd0ad"),
+    "over-2": Colour(OVER[1], "#ff9a5c"),
+    "over-3": Colour(OVER[2], "#c96f33"),
+    "over-4": Colour(OVER[3], "#85512f"),
+}
+
+WIDTH: Final = 7.2  # [in]; about 700 px on a screen, a text width on paper
+
+_STYLE: Final = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib
+    "font.size": 9.0,
+    "mathtext.fontset": "dejavusans",
+    "svg.fonttype": "path",
+    "svg.hashsalt": "stribeck",
+    "path.simplify": True,
+    "path.simplify_threshold": 0.2,
+    "figure.facecolor": PAPER,
+    "figure.edgecolor": "none",
+    "savefig.facecolor": PAPER,
+    "axes.facecolor": "none",
+    "axes.edgecolor": MUTED,
+    "axes.linewidth": 0.8,
+    "axes.labelcolor": INK,
+    "axes.labelsize": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.titlelocation": "left",
+    "axes.titlepad": 7.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "text.color": INK,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 8.5,
+    "ytick.labelsize": 8.5,
+    "lines.linewidth": 1.6,
+    "lines.solid_capstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "legend.handlelength": 1.8,
+    "hatch.linewidth": 0.6,
+}
+
+
+def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
+    """Let `draw` work under the house style and leave matplotlib's settings as they were."""
+
+    @functools.wraps(draw)
+    def drawn(*args: P.args, **kwargs: P.kwargs) -> Figure:
+        with mpl.rc_context(_STYLE):
+            return draw(*args, **kwargs)
+
+    return drawn
+
+
+def new_figure(title: str, *, height: float, subtitle: str = "", simulated: bool = False) -> Figure:
+    """An empty figure of the report's width under a title; to be called inside a `styled` function.
+
+    `height` [in]. A picture of simulated logs says so in its corner, wherever it is copied to.
+    """
+    figure = Figure(figsize=(WIDTH, height), layout="constrained")
+    figure.set_label(plain(title) + (" (SIMULATED)" if simulated else ""))
+    pad = 0.14 if not subtitle else 0.0
+    figure.get_layout_engine().set(w_pad=0.06, h_pad=0.06)  # type: ignore[union-attr]  # set above
+    heading = plain(title)
+    figure.suptitle(
+        heading + ("\n" if subtitle else ""),
+        x=0.012, ha="left", va="top", fontsize=11, fontweight="bold", parse_math=False, linespacing=1.4 + pad,
+    )  # fmt: skip
+    if subtitle:
+        figure.text(
+            0.012, 1 - 0.33 / height, subtitle, ha="left", va="top", fontsize=8.5, color=MUTED, parse_math=False
+        )
+    if simulated:
+        figure.text(
+            0.988, 1 - 0.1 / height, "SIMULATED", ha="right", va="top", fontsize=8, fontweight="bold",
+            color=PAPER, bbox={"boxstyle": "round,pad=0.35", "facecolor": PURPLE, "edgecolor": "none"},
+        )  # fmt: skip
+    return figure
+
+
+def zero_lines(axes: Axes, *, vertical: bool = False) -> None:
+    """Mark zero a little stronger than the grid."""
+    axes.axhline(0.0, color=MUTED, linewidth=0.7, zorder=0.9)
+    if vertical:
+        axes.axvline(0.0, color=MUTED, linewidth=0.7, zorder=0.9)
+
+
+def plain(text: str) -> str:
+    """Text that came from outside, fit to be drawn: control characters become a visible replacement mark."""
+    return re.sub(r"[^\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "\N{REPLACEMENT CHARACTER}", text)
+
+
+def svg_text(figure: Figure) -> str:
+    """The figure as SVG text, the same for the same values."""
+    buffer = io.StringIO()
+    nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+    with mpl.rc_context(_STYLE):
+        FigureCanvasSVG(figure).print_svg(buffer, metadata=nothing)
+    text = buffer.getvalue()
+    title = html.escape(str(figure.get_label()), quote=True)
+    start = text.index("<svg ")
+    end = text.index(">", start) + 1
+    head = text[start : end - 1] + f' role="img" aria-label="{title}">\n <title>{title}</title>'
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + head + text[end:]
