@@ -1,0 +1,116 @@
+"""Compilation of numerical kernels, and a cache that never answers with stale code.
+
+numba's own cache key covers the file of the kernel alone: a kernel goes on answering with old machine
+code after a function that it calls from another file was edited. The cache here adds to the key a digest
+of everything that a kernel reaches by name: the source files of all kernels that it calls, directly or
+through others, and the values of the constants that they use. The digest is taken when a signature is
+compiled or loaded, so the order of definitions does not matter.
+
+Two decorators:
+
+- `compiled` for kernels with plain arguments (numbers, arrays). The machine code is kept on disk.
+- `specialised` for kernels that take compiled functions as arguments, such as an integrator that takes a
+  vector field. They are compiled into the `compiled` kernel that calls them and are cached with it, not
+  by themselves: numba identifies a function argument by the process that made it.
+
+Both follow IEEE arithmetic to the letter (no fused or reordered operations, division by zero gives inf or
+nan): some invariants of the systems solved here hold bit for bit. Both release the interpreter lock.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import types
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any, ParamSpec, TypeVar
+
+import numba
+import numpy as np
+from numba.core.caching import FunctionCache
+from numba.core.dispatcher import Dispatcher
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+def compiled(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile `function` at its first call with given types; the result is cached on disk."""
+    kernel = numba.njit(error_model="numpy", nogil=True)(function)
+    kernel._cache = _ReachingCache(function)  # type: ignore[attr-defined]  # numba has no public way to choose a cache
+    return kernel
+
+
+def specialised(function: Callable[P, R]) -> Callable[P, R]:
+    """Compile `function` into each kernel that calls it; its arguments may be compiled functions."""
+    return numba.njit(error_model="numpy", nogil=True)(function)
+
+
+class _ReachingCache(FunctionCache):
+    """numba's file cache with the digest of all that the kernel reaches in its key."""
+
+    def __init__(self, function: Callable[..., object]) -> None:
+        super().__init__(function)  # type: ignore[no-untyped-call]  # numba leaves its cache untyped
+        self._function = function
+
+    def _index_key(self, sig: object, codegen: object) -> tuple[object, ...]:
+        key = super()._index_key(sig, codegen)  # type: ignore[no-untyped-call]  # as above
+        return (*key, reach_digest(self._function))
+
+
+def reach_digest(function: Callable[..., object]) -> str:
+    """Digest of the source files and constants that a kernel reaches by name, hexadecimal.
+
+    `function` is the Python function of a kernel, or a kernel.
+    """
+    function = getattr(function, "py_func", function)
+    digest = hashlib.sha256()
+    seen: set[Callable[..., object]] = set()
+    files: set[str] = set()
+    pending = [function]
+    while pending:
+        current = pending.pop()
+        if current in seen:
+            continue
+        seen.add(current)
+        files.add(current.__code__.co_filename)
+        for name, value in sorted(_reached(current), key=lambda pair: pair[0]):
+            if isinstance(value, Dispatcher):
+                pending.append(value.py_func)
+            elif isinstance(value, tuple) and any(isinstance(item, Dispatcher) for item in value):
+                pending.extend(item.py_func for item in value if isinstance(item, Dispatcher))
+            elif isinstance(value, np.ndarray):
+                digest.update(f"{name}{value.dtype}{value.shape}".encode() + value.tobytes())
+            elif isinstance(value, (bool, int, float, complex, str, tuple)):
+                digest.update(f"{name}={value!r}".encode())
+    for file in sorted(files):
+        digest.update(_contents(file))
+    return digest.hexdigest()
+
+
+def _reached(function: Callable[..., object]) -> Iterator[tuple[str, Any]]:
+    """Globals that a function names, and what it names inside modules and closures."""
+    names = frozenset(_names(function.__code__))
+    for name in names:
+        value = function.__globals__.get(name)
+        if isinstance(value, types.ModuleType):
+            for attribute in names & vars(value).keys():
+                yield f"{name}.{attribute}", vars(value)[attribute]
+        else:
+            yield name, value
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        yield name, cell.cell_contents
+
+
+def _names(code: types.CodeType) -> Iterator[str]:
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, types.CodeType):
+            yield from _names(constant)
+
+
+@cache
+def _contents(file: str) -> bytes:
+    path = Path(file)
+    return hashlib.sha256(path.read_bytes()).digest() if path.exists() else file.encode()
