@@ -1,0 +1,134 @@
+"""How a rig's logs name things, and what turns a logged number into SI.
+
+A `Signal` says where one quantity stands in one file format and how to convert it:
+
+    SI value = logged value x (unit's factor) x scale x sign + offset
+
+with the offset in SI. `Signals` collects the quantities of one format, `RigSignals` both formats.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from data.findings import LogError
+from data.recording import Axis
+from data.units import Quantity, factor_to_si, parse_unit
+
+FloatArray = NDArray[np.float64]
+Format = Literal["csv", "mcap"]
+Clock = Literal["header", "log", "publish"]
+SUFFIXES: Final[dict[str, Format]] = {".mcap": "mcap", ".csv": "csv", ".tsv": "csv", ".txt": "csv"}
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Where one quantity stands in one format, and its conversion.
+
+    Raises LogError when the unit word is unknown, or scale, sign or offset cannot be.
+    """
+
+    source: str | int  # CSV: header, header without its unit, or number from 0; MCAP: topic:field.path[i]
+    unit: str | None = None  # None: SI
+    scale: float | None = None  # None: 1; an A or V needs one
+    sign: int = 1  # +1 or -1
+    offset: float = 0.0  # in SI
+
+    def __post_init__(self) -> None:
+        if self.unit is not None:
+            parse_unit(self.unit)
+        if self.sign not in (1, -1):
+            raise LogError(f"the sign of {self.source!r} is {self.sign}; it must be 1 or -1")
+        if self.scale is not None and (self.scale == 0.0 or not math.isfinite(self.scale)):
+            raise LogError(f"the scale of {self.source!r} is {self.scale}; it must be finite and not 0")
+        if not math.isfinite(self.offset):
+            raise LogError(f"the offset of {self.source!r} is {self.offset}; it must be finite")
+
+    def to_si(
+        self, values: FloatArray, *, quantity: Quantity, axis: Axis, encoder_counts: float | None
+    ) -> FloatArray:
+        """Logged values (n,) in SI (n,).
+
+        Raises
+        ------
+        LogError
+            When the unit does not fit the quantity, or lacks the constant it needs.
+        """
+        factor = factor_to_si(
+            self.unit,
+            quantity=quantity,
+            axis=axis,
+            encoder_counts=encoder_counts,
+            scaled=self.scale is not None,
+        )
+        total = factor * (1.0 if self.scale is None else self.scale) * self.sign
+        if total == 1.0 and self.offset == 0.0:
+            return values
+        return values * total + self.offset
+
+
+@dataclass(frozen=True)
+class CsvDialect:
+    """How a CSV file is written. What is None is found out by looking."""
+
+    delimiter: str | None = None  # one character, or "whitespace"
+    decimal: Literal[".", ","] | None = None
+    encoding: str | None = None
+    header: bool | None = None  # whether a row of names stands above the numbers
+
+
+@dataclass(frozen=True)
+class Signals:
+    """The quantities of one format; those that a format does not name are None."""
+
+    position: Signal | None = None
+    torque: Signal | None = None
+    time: Signal | None = None  # CSV: needed unless a column is plainly the time; MCAP: None is the stamp
+    velocity: Signal | None = None
+    reference: Signal | None = None
+    clock: Clock | None = None  # MCAP: which stamp is the time; None: the header's where sane, else the log's
+    dialect: CsvDialect | None = None  # CSV: how the file is written, where it shall not be sniffed
+
+
+@dataclass(frozen=True)
+class RigSignals:
+    """What a rig's logs call things, in each format it writes."""
+
+    csv: Signals | None = None
+    mcap: Signals | None = None
+
+    def of(self, file_format: Format) -> Signals:
+        """The names in one format.
+
+        Raises
+        ------
+        LogError
+            When the campaign names nothing in that format.
+        """
+        found = self.csv if file_format == "csv" else self.mcap
+        if found is None:
+            raise LogError(
+                f'the campaign\'s [signals] names nothing for {file_format} logs; add {file_format} = "..." '
+                "to position and torque"
+            )
+        return found
+
+
+def log_format(path: Path) -> Format:
+    """The format that a file's name promises: `.mcap`, or any of `.csv`, `.tsv`, `.txt`.
+
+    Raises
+    ------
+    LogError
+        When the ending is none of these.
+    """
+    found = SUFFIXES.get(path.suffix.lower())
+    if found is None:
+        raise LogError(f"{path.name}: logs are read by their ending, one of {', '.join(SUFFIXES)}; rename it")
+    return found
