@@ -1,0 +1,232 @@
+r"""What the theory of section 4 certifies, for which compensator, and what it does not.
+
+Two laws meet in the loop: the robot's and the compensator's. Each statement below names the law that the
+compensator carries, the hypothesis, and by how much it holds or fails. The statements are:
+
+* *contraction*: L > L_c(worst) of the robot. For given x2(t) any two observer errors approach each other, eq
+  (17). It says that errors forget their start, not that they vanish, and needs nothing of the compensator's
+  law.
+* *(a)* the error goes to zero for every x2(t): contraction, and e = 0 is a solution, which takes each
+  direction's own law with r = 1 (a model of the robot that is exact, b and J included).
+* *(b)* the loop without error is exponentially stable, A_II being Hurwitz (n1 > 0, b^ + n2 > 0).
+* *(c)* S_II is input-to-state stable: a linear Hurwitz system is; with a damping for each direction it is
+  homogeneous of degree one, for which exponential stability implies it too.
+* *theorem*: (a), (b) and (c) make the set point globally exponentially stable.
+* *local contraction*, in each direction: L > L_c of that direction, about creeping that way only.
+* in each direction, r F_s^ >= F_s, without which a segment of equilibria touches the set point whatever L is;
+  and r F_s^ <= F_s, without which the compensation alone breaks the link away.
+* *single equilibrium*: no rest but the set point.
+
+For beta > 1 the critical gain is sufficient for a single equilibrium, not necessary; for beta < 1 it is
+infinite.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from compensation.controller import Controller
+from compensation.design_criteria import critical_observer_gains, loop_decay
+from compensation.equilibria import DIRECTIONS, Direction, equilibrium_set
+from ident.model.friction import StribeckFriction
+from ident.model.robot import OneLinkRobot
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """One statement about one compensator law."""
+
+    law: str  # what the compensator carries, in the caller's words: "per-direction", "mean"
+    hypothesis: str
+    holds: bool
+    margin: float | None  # by how much, in `unit`; negative where it fails; None where no number says it
+    unit: str
+    says: str
+
+
+def certificates(robot: OneLinkRobot, controller: Controller, *, law: str) -> tuple[Certificate, ...]:
+    """All statements about `robot` under a controller whose model is called `law`."""
+    contraction = _contraction(robot, controller, law)
+    exact = _exactness(robot, controller, law)
+    error = _error_vanishes(law, contraction, exact)
+    hurwitz, stable_input = _loop(controller, law)
+    theorem = Certificate(
+        law=law,
+        hypothesis="theorem: (a), (b) and (c)",
+        holds=error.holds and hurwitz.holds and stable_input.holds,
+        margin=error.margin,
+        unit="1/s",
+        says="the set point is globally exponentially stable"
+        if error.holds and hurwitz.holds
+        else "not certified: " + "; ".join(c.says for c in (*exact, contraction, hurwitz) if not c.holds),
+    )
+    directions = [
+        statement
+        for direction in DIRECTIONS
+        for statement in _static_statements(robot, controller, direction, law)
+    ]
+    single = _single_equilibrium(robot, controller, law)
+    return (contraction, *exact, error, hurwitz, stable_input, theorem, *directions, single)
+
+
+def _contraction(robot: OneLinkRobot, controller: Controller, law: str) -> Certificate:
+    worst = critical_observer_gains(robot).worst
+    gain = controller.gains.observer
+    holds = gain > worst
+    if math.isinf(worst):
+        says = (
+            "beta < 1: the law is infinitely steep at rest, and no finite observer gain makes errors contract"
+        )
+    elif holds:
+        says = f"observer errors contract at {gain - worst:.4g} 1/s for given x2(t); by itself not to zero"
+    else:
+        says = (
+            f"L = {gain:.4g} 1/s is below {worst:.4g} 1/s: errors grow while the link creeps in the worse "
+            "direction"
+        )
+    margin = None if math.isinf(worst) else gain - worst
+    return Certificate(law, "contraction: L > L_c(worst) of the robot", holds, margin, "1/s", says)
+
+
+def _exactness(robot: OneLinkRobot, controller: Controller, law: str) -> tuple[Certificate, Certificate]:
+    same = controller.model == robot
+    gap = 0.0 if same else law_gap(robot.friction, controller.model.friction)
+    r = controller.gains.compensation
+    own = Certificate(
+        law=law,
+        hypothesis="the compensator carries the robot's own law in each direction",
+        holds=same,
+        margin=-gap,
+        unit="N m",
+        says="e = 0 is a solution if r = 1, as far as the fitted law is the robot's"
+        if same
+        else f"the compensator's law differs from the robot's by up to {gap:.4g} N m: e = 0 is no solution",
+    )
+    unity = Certificate(
+        law=law,
+        hypothesis="r = 1",
+        holds=r == 1.0,
+        margin=-abs(r - 1.0),
+        unit="1",
+        says="the law is compensated in full" if r == 1.0 else f"r = {r:.6g}: e = 0 is no solution",
+    )
+    return own, unity
+
+
+def _error_vanishes(
+    law: str, contraction: Certificate, exact: tuple[Certificate, Certificate]
+) -> Certificate:
+    holds = contraction.holds and all(statement.holds for statement in exact)
+    failed = [statement.hypothesis for statement in (*exact, contraction) if not statement.holds]
+    return Certificate(
+        law=law,
+        hypothesis="(a) the observer error vanishes for every x2(t)",
+        holds=holds,
+        margin=contraction.margin if all(statement.holds for statement in exact) else None,
+        unit="1/s",
+        says="e = 0 is globally exponentially stable" if holds else "fails: " + "; ".join(failed),
+    )
+
+
+def _loop(controller: Controller, law: str) -> tuple[Certificate, Certificate]:
+    rate = loop_decay(controller).rate
+    holds = rate > 0.0
+    hurwitz = Certificate(
+        law=law,
+        hypothesis="(b) A_II is Hurwitz",
+        holds=holds,
+        margin=rate,
+        unit="1/s",
+        says=f"the loop without observer error decays at {rate:.4g} 1/s"
+        if holds
+        else "no damping: b^ + n2 = 0",
+    )
+    says = (
+        "a vanishing observer error leaves no trace in the position"
+        if holds
+        else "does not follow without (b)"
+    )
+    return hurwitz, Certificate(law, "(c) S_II is input-to-state stable", holds, rate, "1/s", says)
+
+
+def _static_statements(
+    robot: OneLinkRobot, controller: Controller, direction: Direction, law: str
+) -> tuple[Certificate, ...]:
+    true, believed = robot.friction, controller.model.friction
+    held = (true.positive if direction == "positive" else true.negative).static_torque
+    known = (believed.positive if direction == "positive" else believed.negative).static_torque
+    excess = controller.gains.compensation * known - held
+    return (
+        _local_contraction(robot, controller, direction, law),
+        Certificate(
+            law=law,
+            hypothesis=f"r F_s^ >= F_s ({direction})",
+            holds=excess >= 0.0,
+            margin=excess,
+            unit="N m",
+            says="no equilibria touch the set point, whatever L is"
+            if excess > 0.0
+            else "equilibria touch the set point only below the compensator's critical gain"
+            if excess == 0.0
+            else f"a segment of equilibria touches the set point for every L, up to r = {held / known:.6g}"
+            if known > 0.0
+            else "a segment of equilibria touches the set point: nothing is compensated",
+        ),
+        Certificate(
+            law=law,
+            hypothesis=f"r F_s^ <= F_s ({direction})",
+            holds=excess <= 0.0,
+            margin=-excess,
+            unit="N m",
+            says="the compensation does not break the link away"
+            if excess <= 0.0
+            else "overcompensation: the least estimated velocity breaks the link away; expect cycling",
+        ),
+    )
+
+
+def _local_contraction(
+    robot: OneLinkRobot, controller: Controller, direction: Direction, law: str
+) -> Certificate:
+    critical = critical_observer_gains(robot)
+    limit = critical.positive if direction == "positive" else critical.negative
+    gain = controller.gains.observer
+    return Certificate(
+        law=law,
+        hypothesis=f"local contraction: L > L_c ({direction})",
+        holds=gain > limit,
+        margin=gain - limit if math.isfinite(limit) else None,
+        unit="1/s",
+        says=f"errors {'shrink' if gain > limit else 'grow'} while the link creeps that way",
+    )
+
+
+def _single_equilibrium(robot: OneLinkRobot, controller: Controller, law: str) -> Certificate:
+    rests = equilibrium_set(robot, controller)
+    reach = rests.largest_error
+    return Certificate(
+        law=law,
+        hypothesis="the set point is the only equilibrium",
+        holds=rests.is_single_point,
+        margin=-reach if math.isfinite(reach) else None,
+        unit="rad",
+        says="no rest but the set point"
+        if rests.is_single_point
+        else f"the link can rest anywhere in {len(rests.segments)} segment(s) within "
+        f"[{rests.x1_min:.4g}, {rests.x1_max:.4g}] rad",
+    )
+
+
+def law_gap(first: StribeckFriction, second: StribeckFriction) -> float:
+    """Largest difference of two laws' dry friction magnitudes [N m], over both directions and all speeds."""
+    gaps = [abs(first.positive.coulomb_torque - second.positive.coulomb_torque)]
+    gaps.append(abs(first.negative.coulomb_torque - second.negative.coulomb_torque))
+    for one, other in ((first.positive, second.positive), (first.negative, second.negative)):
+        speeds = np.concatenate(
+            ([0.0], np.geomspace(1e-4, 30.0, 500) * max(one.stribeck_velocity, other.stribeck_velocity))
+        )
+        gaps.append(float(np.max(np.abs(one.dry(speeds) - other.dry(speeds)))))
+    return max(gaps)
