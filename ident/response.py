@@ -1,0 +1,174 @@
+r"""The robot under held torque samples, exact between the samples.
+
+A digital controller holds its torque u for a sample period h. Eq (1) is then autonomous in each direction
+of motion,
+
+    J v' = u - b v - F(v),
+
+so the speed is monotone while the link slips: it comes to rest at most once in a period. At rest the link
+stays for the rest of the period if -F_s(negative) <= u <= F_s(positive), and otherwise goes on in the
+direction of u. Slip is integrated by a Taylor series whose step follows from its own last terms
+(`ident.slip_series`); for beta other than 1 the moments next to rest are a quadrature (`ident.near_rest`).
+No step size is left to choose: the result is exact to rounding for any sample period and any admissible
+law.
+
+A kernel sees the robot as its `law_array`: J, then F_s, F_c, v_s, b, beta of positive and of negative
+velocity.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final, Literal
+
+import numpy as np
+
+from data.recording import FloatArray
+from ident.model.friction import ModelError
+from ident.model.robot import OneLinkRobot
+from ident.near_rest import slip_near_rest, speed_limit
+from ident.simulation.compiled import compiled
+from ident.slip_series import (
+    distance_at,
+    expand,
+    part_at_distance,
+    part_at_rest,
+    speed_at,
+    workspace,
+)
+
+_MOST_STEPS: Final = 100_000  # far above what any law needs: a loop that cannot end is worse than a NaN
+_EARLY: Final = (
+    1e-9  # where beta is not 1, a ramp's series starts at this part of the shortest possible delay
+)
+
+
+def law_array(robot: OneLinkRobot) -> FloatArray:
+    """The robot as kernels see it, (11,), SI: J, then F_s, F_c, v_s, b, beta of either direction."""
+    values = [robot.inertia]
+    for curve in (robot.friction.positive, robot.friction.negative):
+        values += [
+            curve.static_torque,
+            curve.coulomb_torque,
+            curve.stribeck_velocity,
+            curve.viscous_damping,
+            curve.stribeck_shape,
+        ]
+    return np.array(values)
+
+
+@compiled
+def advance(
+    position: float, velocity: float, torque: float, period: float, law: FloatArray
+) -> tuple[float, float]:
+    """Position [rad] and velocity [rad/s] after `period` [s] under a held `torque` [N m]; `law` from
+    `law_array`.
+    """
+    if velocity == 0.0 and -law[6] <= torque <= law[1]:
+        return position, 0.0
+    series = workspace()
+    inertia, left = law[0], period
+    for _ in range(_MOST_STEPS):
+        if velocity == 0.0:
+            if -law[6] <= torque <= law[1]:
+                return position, 0.0
+            sign = 1.0 if torque > 0.0 else -1.0
+        else:
+            sign = 1.0 if velocity > 0.0 else -1.0
+        curve = law[1:6] if sign > 0.0 else law[6:11]
+        speed, excess = abs(velocity), sign * torque - curve[0]
+        plain = curve[4] == 1.0 or curve[0] == curve[1]
+        if not plain and speed < speed_limit(excess, curve):
+            speed, distance, used = slip_near_rest(speed, excess, left, inertia, curve)
+        else:
+            order, used = expand(speed, (excess, 0.0), left, (inertia, curve), series)
+            part = 1.0
+            speed = speed_at(series, order, 1.0)
+            if speed <= 0.0:
+                part = part_at_rest(series, order)
+                speed = 0.0
+            distance = distance_at(series, order, part, used)
+            used *= part
+        position += sign * distance
+        velocity = sign * speed if speed > 0.0 else 0.0
+        left -= used
+        if left <= 0.0:
+            return position, velocity
+    return math.nan, math.nan
+
+
+@compiled
+def _respond(
+    position: float, velocity: float, torque: FloatArray, period: float, law: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    positions = np.empty(torque.size + 1)
+    velocities = np.empty(torque.size + 1)
+    positions[0], velocities[0] = position, velocity
+    for k in range(torque.size):
+        position, velocity = advance(position, velocity, torque[k], period, law)
+        positions[k + 1], velocities[k + 1] = position, velocity
+    return positions, velocities
+
+
+def respond(
+    robot: OneLinkRobot, *, start: tuple[float, float], torque: FloatArray, period: float
+) -> tuple[FloatArray, FloatArray]:
+    """Motion of the robot under torque samples held for a period each, eqs (1)-(4).
+
+    Parameters
+    ----------
+    start : position [rad] and velocity [rad/s] at the first sample
+    torque : (n,) [N m], sample k held from k h to (k + 1) h
+    period : h [s], > 0
+
+    Returns
+    -------
+    position (n + 1,) [rad], velocity (n + 1,) [rad/s], at the samples and at the end of the last one.
+
+    Raises `ModelError` for a period, start or torque that no rig can have.
+    """
+    if not (math.isfinite(period) and period > 0):
+        raise ModelError(f"sample period is {period} s: a held torque needs a period > 0")
+    held = np.ascontiguousarray(torque, dtype=np.float64)
+    if held.ndim != 1 or not np.all(np.isfinite(held)) or not np.all(np.isfinite(start)):
+        raise ModelError("start and torque samples must be finite, and the torque one array (n,)")
+    positions, velocities = _respond(float(start[0]), float(start[1]), held, period, law_array(robot))
+    return positions, velocities
+
+
+@compiled
+def _breakaway_delay(ramp: float, travel: float, inertia: float, curve: FloatArray) -> float:
+    series = workspace()
+    stribeck_torque = curve[0] - curve[1]
+    time = speed = distance = 0.0
+    whole = (6.0 * inertia * travel / ramp) ** (1.0 / 3.0)  # the delay without a Stribeck effect
+    if curve[4] != 1.0 and stribeck_torque > 0.0:
+        time = _EARLY * min(whole, math.sqrt(2.0 * inertia * travel / stribeck_torque))
+        speed = 0.5 * ramp * time * time / inertia
+        distance = speed * time / 3.0
+    for _ in range(_MOST_STEPS):
+        order, step = expand(speed, (ramp * time, ramp), whole, (inertia, curve), series)
+        gone = distance_at(series, order, 1.0, step)
+        if distance + gone >= travel:
+            return time + step * part_at_distance(series, order, step, travel - distance)
+        time, distance, speed = time + step, distance + gone, speed_at(series, order, 1.0)
+    return math.nan
+
+
+def breakaway_delay(
+    robot: OneLinkRobot, *, direction: Literal["positive", "negative"], ramp_rate: float, travel: float
+) -> float:
+    """Time [s] from the onset of slip to a displacement, under a torque ramp that goes on.
+
+    The onset is where |u| = F_s of the `direction`; `ramp_rate` [N m/s] and `travel` [rad] are magnitudes.
+    A detector that waits for `travel` therefore reads a static torque that is too large by `ramp_rate`
+    times this delay. For small travel and beta = 1 it tends to the root of (u' tau^2 / J) (tau (e^(t/tau) -
+    1) - t - t^2 / (2 tau)) = travel, with tau = J / (dF / v_s - b). Raises `ModelError` unless both
+    magnitudes are finite and > 0.
+    """
+    for name, value in (("ramp rate", ramp_rate), ("travel", travel)):
+        if not (math.isfinite(value) and value > 0):
+            raise ModelError(f"{name} is {value}: a breakaway needs a ramp and a travel > 0, as magnitudes")
+    law = law_array(robot)
+    curve = law[1:6] if direction == "positive" else law[6:11]
+    return float(_breakaway_delay(ramp_rate, travel, robot.inertia, curve))
