@@ -12,13 +12,14 @@ direction of u. Slip is integrated by a Taylor series whose step follows from it
 No step size is left to choose: the result is exact to rounding for any sample period and any admissible
 law.
 
-A kernel sees the robot as its `law_array`: J, then F_s, F_c, v_s, b, beta of positive and of negative
-velocity.
+A joint may also have a torque that depends on its position (cogging, a gear's teeth). It is taken constant
+over a sample period, like the torque that it adds to.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
@@ -38,9 +39,7 @@ from ident.slip_series import (
 )
 
 _MOST_STEPS: Final = 100_000  # far above what any law needs: a loop that cannot end is worse than a NaN
-_EARLY: Final = (
-    1e-9  # where beta is not 1, a ramp's series starts at this part of the shortest possible delay
-)
+_EARLY: Final = 1e-9  # where beta is not 1, a ramp's series starts at this part of the shortest delay
 
 
 def law_array(robot: OneLinkRobot) -> FloatArray:
@@ -57,12 +56,30 @@ def law_array(robot: OneLinkRobot) -> FloatArray:
     return np.array(values)
 
 
+@dataclass(frozen=True)
+class TorqueRipple:
+    """A torque amplitude x sin(harmonic x q + phase) that acts beside the motor's; none by default."""
+
+    amplitude: float = 0.0  # [N m]
+    harmonic: float = 0.0  # [1/rad]: periods in a revolution
+    phase: float = 0.0  # [rad]
+
+
+NO_RIPPLE: Final = TorqueRipple()
+
+
+def plant_array(robot: OneLinkRobot, ripple: TorqueRipple = NO_RIPPLE) -> FloatArray:
+    """The robot and its ripple as kernels see them, (14,), SI: `law_array`, amplitude, harmonic, phase."""
+    return np.array([*law_array(robot), ripple.amplitude, ripple.harmonic, ripple.phase])
+
+
 @compiled
 def advance(
     position: float, velocity: float, torque: float, period: float, law: FloatArray
 ) -> tuple[float, float]:
-    """Position [rad] and velocity [rad/s] after `period` [s] under a held `torque` [N m]; `law` from
-    `law_array`.
+    """Position [rad] and velocity [rad/s] after `period` [s] under a held `torque` [N m].
+
+    `law` is a `law_array`, or a `plant_array`, whose ripple is left to `advance_with_ripple`.
     """
     if velocity == 0.0 and -law[6] <= torque <= law[1]:
         return position, 0.0
@@ -95,6 +112,15 @@ def advance(
         if left <= 0.0:
             return position, velocity
     return math.nan, math.nan
+
+
+@compiled
+def advance_with_ripple(
+    position: float, velocity: float, torque: float, period: float, plant: FloatArray
+) -> tuple[float, float]:
+    """As `advance`, with the ripple of a `plant_array` at the sample's position added to the torque."""
+    added = plant[11] * math.sin(plant[12] * position + plant[13]) if plant[11] != 0.0 else 0.0
+    return advance(position, velocity, torque + added, period, plant)
 
 
 @compiled
