@@ -16,6 +16,8 @@ compensator carries, the hypothesis, and by how much it holds or fails. The stat
 * in each direction, r F_s^ >= F_s, without which a segment of equilibria touches the set point whatever L is;
   and r F_s^ <= F_s, without which the compensation alone breaks the link away.
 * *single equilibrium*: no rest but the set point.
+* *the paper's criterion*, L > L_c(mean): what the paper asks of its symmetric robot. A robot whose directions
+  differ gets nothing from it, whichever law compensates.
 
 For beta > 1 the critical gain is sufficient for a single equilibrium, not necessary; for beta < 1 it is
 infinite.
@@ -42,7 +44,7 @@ class Certificate:
     law: str  # what the compensator carries, in the caller's words: "per-direction", "mean"
     hypothesis: str
     holds: bool
-    margin: float | None  # by how much, in `unit`; negative where it fails; None where no number says it
+    margin: float | None  # [unit] by how much; negative where it fails; None where no number says it
     unit: str
     says: str
 
@@ -69,7 +71,8 @@ def certificates(robot: OneLinkRobot, controller: Controller, *, law: str) -> tu
         for statement in _static_statements(robot, controller, direction, law)
     ]
     single = _single_equilibrium(robot, controller, law)
-    return (contraction, *exact, error, hurwitz, stable_input, theorem, *directions, single)
+    paper = _papers_criterion(robot, controller, law)
+    return (contraction, *exact, error, hurwitz, stable_input, theorem, *directions, single, paper)
 
 
 def _contraction(robot: OneLinkRobot, controller: Controller, law: str) -> Certificate:
@@ -99,7 +102,7 @@ def _exactness(robot: OneLinkRobot, controller: Controller, law: str) -> tuple[C
         law=law,
         hypothesis="the compensator carries the robot's own law in each direction",
         holds=same,
-        margin=-gap,
+        margin=0.0 - gap,
         unit="N m",
         says="e = 0 is a solution if r = 1, as far as the fitted law is the robot's"
         if same
@@ -109,7 +112,7 @@ def _exactness(robot: OneLinkRobot, controller: Controller, law: str) -> tuple[C
         law=law,
         hypothesis="r = 1",
         holds=r == 1.0,
-        margin=-abs(r - 1.0),
+        margin=0.0 - abs(r - 1.0),
         unit="1",
         says="the law is compensated in full" if r == 1.0 else f"r = {r:.6g}: e = 0 is no solution",
     )
@@ -179,12 +182,28 @@ def _static_statements(
             law=law,
             hypothesis=f"r F_s^ <= F_s ({direction})",
             holds=excess <= 0.0,
-            margin=-excess,
+            margin=0.0 - excess,
             unit="N m",
             says="the compensation does not break the link away"
             if excess <= 0.0
             else "overcompensation: the least estimated velocity breaks the link away; expect cycling",
         ),
+    )
+
+
+def _papers_criterion(robot: OneLinkRobot, controller: Controller, law: str) -> Certificate:
+    limit = critical_observer_gains(robot).mean
+    gain = controller.gains.observer
+    symmetric = robot.friction.positive == robot.friction.negative
+    return Certificate(
+        law=law,
+        hypothesis="L > L_c(mean), the paper's criterion for a symmetric robot",
+        holds=gain > limit,
+        margin=gain - limit if math.isfinite(limit) else None,
+        unit="1/s",
+        says="the robot is symmetric: this is the contraction above"
+        if symmetric
+        else "certifies nothing here: the robot's directions differ from their mean",
     )
 
 
@@ -211,7 +230,7 @@ def _single_equilibrium(robot: OneLinkRobot, controller: Controller, law: str) -
         law=law,
         hypothesis="the set point is the only equilibrium",
         holds=rests.is_single_point,
-        margin=-reach if math.isfinite(reach) else None,
+        margin=0.0 - reach if math.isfinite(reach) else None,
         unit="rad",
         says="no rest but the set point"
         if rests.is_single_point

@@ -96,7 +96,7 @@ def _advice(
 ) -> Advice:
     model = robot.mean() if law == "mean" else robot
     limits = overcompensation_thresholds(robot, model.friction)
-    weaker: Direction = "positive" if limits["positive"] <= limits["negative"] else "negative"
+    weaker = _weaker(limits)
     if thresholds is None:
         r, doubt = limits[weaker] * (1.0 - ASSUMED_UNCERTAINTY), "assuming 1 % of uncertainty in the friction"
     else:
@@ -116,14 +116,14 @@ def _advice(
         observer_gain=L,
         compensation_gain=r,
         largest_rest_error=error if error is None or math.isfinite(error) else None,
-        why=_reason(law, model is robot or model == robot, weaker, limits, r=r, doubt=doubt, high=high, L=L),
+        why=_reason(robot, model, law, limits, r=r, doubt=doubt, high=high, L=L),
     )
 
 
 def _reason(
+    robot: OneLinkRobot,
+    model: OneLinkRobot,
     law: Law,
-    exact: bool,
-    weaker: Direction,
     limits: dict[Direction, float],
     *,
     r: float,
@@ -138,18 +138,34 @@ def _reason(
             f"L = {L:.4g} 1/s lies above the robot's worst critical gain, {high:.4g} 1/s at its upper end, "
             "by a margin in which the observer is faster than the loop. "
         )
-    if exact:
+    if model == robot:
         which = "Each direction's own law" if law == "per-direction" else "The one law of both directions"
         return (
             f"{observer}{which} leaves only the fit's error: r = {r:.4g} undercompensates by it ({doubt}), "
             "so the link comes to rest near the set point instead of cycling."
         )
+    weaker = _weaker(limits)
     other = DIRECTIONS[1 - DIRECTIONS.index(weaker)]
+    rest_limit = static_ratio(robot, model, other)
     return (
         f"{observer}The mean law overcompensates the {weaker} direction from r = {limits[weaker]:.4g} on, so "
         f"r = {r:.4g} stays below it ({doubt}); rests in the {other} direction remain up to "
-        f"r = {limits[other]:.4g}, for any observer gain."
+        f"r = {rest_limit:.4g}, for any observer gain."
     )
+
+
+def _weaker(limits: dict[Direction, float]) -> Direction:
+    return "positive" if limits["positive"] <= limits["negative"] else "negative"
+
+
+def static_ratio(robot: OneLinkRobot, model: OneLinkRobot, direction: Direction) -> float:
+    """F_s / F_s^ of a direction [-]: the r at which equilibria cease to touch the set point."""
+    true, believed = robot.friction, model.friction
+    if direction == "positive":
+        held, applied = true.positive.static_torque, believed.positive.static_torque
+    else:
+        held, applied = true.negative.static_torque, believed.negative.static_torque
+    return held / applied if applied > 0.0 else math.inf
 
 
 def _threshold(true: StribeckFriction, model: StribeckFriction, direction: Direction) -> float:

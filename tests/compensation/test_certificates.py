@@ -45,6 +45,8 @@ def test_the_mean_law_certifies_nothing_for_the_asymmetric_robot(L: float) -> No
     assert not named(found, "r F_s^ >= F_s (positive)").holds
     assert not named(found, "the set point").holds
     assert named(found, "contraction").holds == (L > 94.37)
+    assert named(found, "L > L_c(mean)").holds
+    assert "certifies nothing" in named(found, "L > L_c(mean)").says
 
 
 def test_each_directions_own_law_needs_the_worst_gain() -> None:

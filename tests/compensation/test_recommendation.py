@@ -64,7 +64,8 @@ def test_uncertainty_lowers_r_and_raises_the_observer_gain() -> None:
     assert doubtful[0].observer_gain > 110.0 > plain.observer_gain
     assert doubtful[0].compensation_gain == 0.95
     assert doubtful[1].compensation_gain == 0.9
-    assert "negative" in doubtful[1].why
+    assert "overcompensates the negative direction from r = 0.9436" in doubtful[1].why
+    assert "rests in the positive direction remain up to r = 1.056" in doubtful[1].why
 
 
 def test_a_symmetric_robot_has_one_law() -> None:

@@ -1,0 +1,249 @@
+"""design: what the identified friction asks of the compensator, eqs (9)-(17).
+
+`design.json`, schema `stribeck/design/1`:
+
+- `critical_observer_gain`: `positive`, `negative`, `mean`, `worst`, each `{"value", "interval95", "unit",
+"withheld"}` [1/s];
+  a value that does not exist is `null`, with the reason in `withheld`;
+- `decay_rate`: `observer_error` (L minus the worst critical gain of the robot as it moves; below 0 errors
+grow) and
+  `loop` (without observer error), the same fields;
+- `overcompensation_threshold`: for each compensator the largest r [-] that overcompensates nowhere, by
+direction; - `equilibrium_sets`: for r = 0, r = 1 and the chosen r at the chosen L: `{"r", "observer_gain",
+"x1_min", "x1_max",
+  "single_point", "segments"}`;
+- `certificates`: `{"robot", "law", "hypothesis", "holds", "margin", "unit", "says"}`, for the compensator
+with each direction's own
+  law and the one with the mean law on the robot, and for the mean law on the mean robot, the paper's
+  analysis;
+- `recommended`: `{"observer_gain", "compensation_gain", "compensator", "largest_rest_error", "why"}`, and
+`alternatives`; - `gains`, `law`, `compensator`, `draws`, `seed`, `withheld`: what was asked, and what could
+not be answered.
+
+Intervals are the 2.5 and 97.5 % quantiles over robots drawn from the fit's joint normal distribution. The
+published robot has none: its intervals are null. It moves with the mean of Table 1's columns, and both
+columns are reported.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import Final
+
+from compensation.certificates import Certificate, certificates
+from compensation.controller import Controller, Gains
+from compensation.design_criteria import critical_observer_gains
+from compensation.equilibria import EquilibriumSet, equilibrium_set
+from compensation.recommendation import Advice, recommend
+from ident.model import published
+from ident.model.robot import OneLinkRobot
+from pipelines.design_quantities import (
+    RATES,
+    Quantity,
+    critical_gains,
+    critical_gains_of_known_directions,
+    decay_rates,
+    drawn_robots,
+    threshold_ends,
+    threshold_values,
+)
+from pipelines.equilibrium_sweeps import FIGURE_8_GAINS, edges, extrema, observer_gain_axis
+from pipelines.loop_settings import LawChoice
+from pipelines.results import ResultFolder
+from pipelines.robot_file import RobotFile
+
+DESIGN_SCHEMA: Final = "stribeck/design/1"
+DRAWS: Final = 1000
+
+
+@dataclass(frozen=True)
+class Design:
+    """All of design.json, and what its figures need."""
+
+    name: str
+    gains: Gains
+    law: LawChoice
+    compensator: str
+    critical: Mapping[str, Quantity]
+    decay: Mapping[str, Quantity]
+    thresholds: Mapping[str, Mapping[str, float | None]]
+    rests: tuple[tuple[float, EquilibriumSet], ...]  # (r, set)
+    certificates: tuple[tuple[str, Certificate], ...]  # (robot, certificate)
+    advice: tuple[Advice, ...]
+    withheld: tuple[str, ...]
+    draws: int
+    seed: int
+    moving: OneLinkRobot | None  # the robot as it moves; None where a parameter is withheld
+    model: OneLinkRobot | None  # what its controller believes
+    axis: str
+    simulated: bool
+
+
+def design(
+    source: RobotFile,
+    gains: Gains,
+    *,
+    law: LawChoice = "per-direction",
+    compensator: LawChoice | None = None,
+    draws: int = DRAWS,
+    seed: int = 0,
+) -> Design:
+    """The design of a robot file; what a withheld parameter leaves open is null with the reason."""
+    if source.published:
+        law = "mean"  # the paper's robot is the mean of its columns
+    robot = published.asymmetric_robot() if source.published else source.fitted
+    nothing = Design(
+        name=source.name,
+        gains=gains,
+        law=law,
+        compensator=_compensator_name(source, compensator),
+        critical=critical_gains_of_known_directions(source),
+        decay={name: Quantity(None, "1/s", withheld="; ".join(source.missing())) for name in RATES},
+        thresholds={},
+        rests=(),
+        certificates=(),
+        advice=(),
+        withheld=tuple(source.missing()),
+        draws=0,
+        seed=seed,
+        moving=None,
+        model=None,
+        axis="rotary" if source.identified is None else source.identified.axis,
+        simulated=source.simulated,
+    )
+    if robot is None:
+        return nothing
+    drawn = drawn_robots(source, draws, seed)
+    critical = critical_gains(robot, drawn)
+    moving, model = source.moving(law), source.compensating(compensator)
+    controller = Controller(gains, model)
+    worst_high = critical["worst"].interval95[1] if critical["worst"].interval95 is not None else None
+    return replace(
+        nothing,
+        critical=critical,
+        decay=decay_rates(moving, controller, [one.mean() if law == "mean" else one for one in drawn]),
+        thresholds=threshold_values(robot),
+        rests=tuple(
+            (r, equilibrium_set(moving, Controller(replace(gains, compensation=r), model)))
+            for r in sorted({0.0, 1.0, gains.compensation})
+        ),
+        certificates=_all_certificates(robot, gains),
+        advice=recommend(
+            robot,
+            proportional=gains.proportional,
+            derivative=gains.derivative,
+            worst_gain_high=worst_high,
+            thresholds=threshold_ends(robot, drawn),
+        ),
+        draws=len(drawn),
+        moving=moving,
+        model=model,
+    )
+
+
+def write_design(result: Design, folder: ResultFolder) -> None:
+    """design.json, and figure4.svg and figure8.svg where the robot is identified."""
+    folder.write_json("design.json", DESIGN_SCHEMA, _document(result))
+    if result.moving is None or result.model is None:
+        return
+    from pipelines.report.equilibrium_figures import figure4, figure8  # noqa: PLC0415  (matplotlib)
+    from pipelines.report.style import svg_text  # noqa: PLC0415
+
+    gains, moving, model = result.gains, result.moving, result.model
+    limit = critical_observer_gains(moving).worst
+    swept = observer_gain_axis(limit, gains.observer)
+    critical = limit if math.isfinite(limit) and limit > 0 else None
+    subtitle = f"{result.name}: n1 = {gains.proportional:g}, n2 = {gains.derivative:g}; {_loop_words(result)}"
+    exact, none = (
+        extrema(moving, model, gains, compensation_gain=r, observer_gain=swept) for r in (1.0, 0.0)
+    )
+    drawn_4 = figure4(
+        swept,
+        exact,
+        none,
+        critical_gain=critical,
+        subtitle=subtitle,
+        axis=result.axis,
+        simulated=result.simulated,
+    )
+    folder.write_text("figure4.svg", svg_text(drawn_4))
+    drawn_8 = figure8(
+        swept,
+        {r: edges(moving, model, gains, compensation_gain=r, observer_gain=swept) for r in FIGURE_8_GAINS},
+        critical_gain=critical,
+        subtitle=subtitle,
+        axis=result.axis,
+        simulated=result.simulated,
+    )
+    folder.write_text("figure8.svg", svg_text(drawn_8))
+
+
+def _compensator_name(source: RobotFile, choice: LawChoice | None) -> str:
+    if choice is None and source.loop.compensator is not None:
+        return "as the campaign says"
+    return choice or "mean"
+
+
+def _loop_words(result: Design) -> str:
+    moves = "each direction's own friction" if result.law == "per-direction" else "the mean friction"
+    return f"{moves}, compensator: {result.compensator}"
+
+
+def _all_certificates(robot: OneLinkRobot, gains: Gains) -> tuple[tuple[str, Certificate], ...]:
+    mean = robot.mean()
+    cases = (
+        ("both directions", robot, robot, "per-direction"),
+        ("both directions", robot, mean, "mean"),
+        ("mean", mean, mean, "mean"),
+    )
+    return tuple(
+        (name, certificate)
+        for name, moving, model, law in cases
+        for certificate in certificates(moving, Controller(gains, model), law=law)
+    )
+
+
+def _document(result: Design) -> dict[str, object]:
+    return {
+        "robot": result.name,
+        "simulated": result.simulated,
+        "gains": result.gains,
+        "law": result.law,
+        "compensator": result.compensator,
+        "critical_observer_gain": result.critical,
+        "decay_rate": result.decay,
+        "overcompensation_threshold": result.thresholds,
+        "equilibrium_sets": [_rest_document(r, found, result.gains) for r, found in result.rests],
+        "certificates": [{"robot": name, **asdict(one)} for name, one in result.certificates],
+        "recommended": _recommended(result),
+        "draws": result.draws,
+        "seed": result.seed,
+        "withheld": result.withheld,
+    }
+
+
+def _rest_document(r: float, found: EquilibriumSet, gains: Gains) -> dict[str, object]:
+    def finite(value: float) -> float | None:
+        return value if math.isfinite(value) else None
+
+    return {
+        "r": r,
+        "observer_gain": gains.observer,
+        "x1_min": finite(found.x1_min),
+        "x1_max": finite(found.x1_max),
+        "single_point": found.is_single_point,
+        "segments": [
+            {"direction": s.direction, "x1_min": finite(s.x1_min), "x1_max": finite(s.x1_max)}
+            for s in found.segments
+        ],
+    }
+
+
+def _recommended(result: Design) -> dict[str, object]:
+    if not result.advice:
+        empty = dict.fromkeys(("observer_gain", "compensation_gain", "compensator", "largest_rest_error"))
+        return {**empty, "why": "; ".join(result.withheld), "alternatives": []}
+    best, *others = (asdict(advice) for advice in result.advice)
+    return {**best, "alternatives": others}
