@@ -1,14 +1,28 @@
-"""Figures 9 and 10: where the loop ends up over the compensation gain, predicted and recorded."""
+"""Figure 9: where the closed loop ends up over a gain, predicted.
+
+Equilibrium sets are filled from their least to their largest x1, limit cycles are drawn by max|x1| over a
+period, unstable equilibria are dashed; (I), (II) and (III) name them as the paper does.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Sequence
+from typing import Final
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
-from pipelines.report.drawn_values import DrawnDiagram
-from pipelines.report.style import styled
+from data.recording import FloatArray
+from pipelines.report.axis_units import units_of
+from pipelines.report.drawn_values import BranchPoint, DrawnBranch, DrawnDiagram
+from pipelines.report.style import BLUE, INK, MUTED, VERMILLION, new_figure, styled, zero_lines
+
+_PARAMETER: Final = {"r": "compensation gain $r$", "L": "observer gain $L$ [1/s]"}
+_ROMAN: Final = {"limit_cycle": "(I)", "equilibrium_set": "(II)", "equilibrium": "(III)"}
+_SET_OPACITY: Final = 0.25
 
 
 @styled
@@ -20,20 +34,86 @@ def figure9(
     axis: str = "rotary",
     simulated: bool = False,
 ) -> Figure:
-    """Equilibrium sets filled, limit cycles by max|x1|, unstable equilibria dashed; (I), (II), (III) as printed."""
-    raise NotImplementedError
+    """All branches and bifurcations of `diagram` over its parameter."""
+    figure = new_figure(title, height=4.1, subtitle=subtitle, simulated=simulated)
+    axes = figure.subplots()
+    zero_lines(axes)
+    named: set[str] = set()
+    for branch in sorted(diagram.branches, key=lambda branch: -len(branch.points)):
+        draw_branch(axes, branch, cycle=VERMILLION, rest=BLUE)
+        if branch.kind not in named:
+            _name(axes, branch)
+            named.add(branch.kind)
+    for bifurcation in diagram.bifurcations:
+        axes.axvline(bifurcation.value, color=INK, linewidth=0.9, linestyle=(0, (1.5, 2)), zorder=2.5)
+        axes.annotate(
+            f"{bifurcation.kind.replace('_', ' ')}, {diagram.parameter} = {bifurcation.value:.4g}",
+            (bifurcation.value, 1.0), (-4, -2), xycoords=("data", "axes fraction"),
+            textcoords="offset points", ha="right", va="top", fontsize=8.0, color=MUTED, parse_math=False,
+        )  # fmt: skip
+    unit = units_of(axis).position
+    axes.set(
+        xlabel=_PARAMETER.get(diagram.parameter, diagram.parameter),
+        ylabel=f"$x_1$ at rest, $\\max|x_1|$ of a cycle [{unit}]",
+    )
+    axes.margins(x=0.0)
+    figure.legend(handles=_legend(diagram.branches), loc="outside lower center", ncols=4)
+    return figure
 
 
-@styled
-def figure10(
-    comparison: Mapping[str, Any],
-    *,
-    fitted: DrawnDiagram | None = None,
-    symmetric: DrawnDiagram | None = None,
-    title: str = "Recorded runs over the prediction",
-    subtitle: str = "",
-    axis: str = "rotary",
-    simulated: bool = False,
-) -> Figure:
-    """Recorded runs and onsets, as comparison.json holds them, over the diagrams of the fitted and the mean robot."""
-    raise NotImplementedError
+def draw_branch(axes: Axes, branch: DrawnBranch, *, cycle: str, rest: str) -> None:
+    """One branch: a filled set, a line of amplitudes, or a line of equilibria; dashed where unstable."""
+    value, low, high, amplitude = branch_arrays(branch.points)
+    dashes = "-" if branch.stable else (0, (4, 2.2))
+    if branch.kind == "limit_cycle":
+        axes.plot(value, amplitude, color=cycle, linestyle=dashes, linewidth=2.0, zorder=3.2)
+    elif branch.kind == "equilibrium_set":
+        axes.fill_between(value, low, high, color=rest, alpha=_SET_OPACITY, linewidth=0, zorder=2)
+        for edge in (low, high):
+            axes.plot(value, edge, color=rest, linestyle=dashes, linewidth=1.2, zorder=2.6)
+    else:
+        axes.plot(value, 0.5 * (low + high), color=INK, linestyle=dashes, linewidth=1.4, zorder=3)
+
+
+def branch_arrays(points: Sequence[BranchPoint]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Value, x1_min, x1_max [rad], max|x1| [rad] along a branch, each (n,); NaN where a point has none."""
+    rows = [(point.value, point.x1_min, point.x1_max, point.amplitude) for point in points]
+    columns = np.array([[np.nan if x is None else x for x in row] for row in rows], dtype=np.float64)
+    value, low, high, amplitude = columns.reshape(-1, 4).T
+    return value, low, high, amplitude
+
+
+def _name(axes: Axes, branch: DrawnBranch) -> None:
+    value, low, high, amplitude = branch_arrays(branch.points)
+    if not value.size:
+        return
+    middle = value.size // 2
+    heights = {"limit_cycle": amplitude, "equilibrium_set": 0.5 * (low + high), "equilibrium": high}
+    offsets = {"limit_cycle": (-6, 8), "equilibrium_set": (0, 10), "equilibrium": (0, 10)}
+    if branch.kind == "equilibrium_set":
+        middle = value.size // 3
+    axes.annotate(
+        _ROMAN.get(branch.kind, ""),
+        (value[middle], heights.get(branch.kind, high)[middle]),
+        offsets.get(branch.kind, (0, 8)),
+        textcoords="offset points",
+        ha="center", va="center", fontweight="bold", zorder=5,
+    )  # fmt: skip
+
+
+def _legend(branches: Sequence[DrawnBranch]) -> list[Line2D | Patch]:
+    kinds = {(branch.kind, branch.stable) for branch in branches}
+    handles: list[Line2D | Patch] = []
+    if ("limit_cycle", True) in kinds:
+        handles.append(
+            Line2D([], [], color=VERMILLION, linewidth=2, label="(I) stable limit cycle, $\\max|x_1|$")
+        )
+    if ("limit_cycle", False) in kinds:
+        handles.append(Line2D([], [], color=VERMILLION, linestyle="--", label="unstable limit cycle"))
+    if {("equilibrium_set", True), ("equilibrium_set", False)} & kinds:
+        handles.append(Patch(facecolor=BLUE, alpha=_SET_OPACITY, label="(II) equilibrium set"))
+    if ("equilibrium", False) in kinds:
+        handles.append(Line2D([], [], color=INK, linestyle="--", label="(III) unstable equilibrium point"))
+    if ("equilibrium", True) in kinds:
+        handles.append(Line2D([], [], color=INK, label="stable equilibrium point"))
+    return handles

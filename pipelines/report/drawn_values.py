@@ -77,7 +77,7 @@ class DrawnBranch(Protocol):
 
     @property
     def kind(self) -> str:
-        """"equilibrium_set", "limit_cycle" or "equilibrium"."""
+        """One of "equilibrium_set", "limit_cycle", "equilibrium"."""
 
     @property
     def stable(self) -> bool:
@@ -105,7 +105,7 @@ class DrawnDiagram(Protocol):
 
     @property
     def parameter(self) -> str:
-        """"r" or "L"."""
+        """Over what: "r" or "L"."""
 
     @property
     def branches(self) -> Sequence[DrawnBranch]:

@@ -1,12 +1,13 @@
 """Figure 2: friction measurements and the friction model fitted to them.
 
-On the left every measurement over the signed velocity, as the paper draws it; on the right the magnitudes over
-the speed on a logarithmic scale that reaches down to rest, where the Stribeck part is wide enough to be judged
-and the two directions lie over each other. A run that was left out stays visible, as a hollow mark.
+On the left every measurement over the signed velocity, as the paper draws it; on the right the magnitudes
+over the speed, spread out towards rest so that the Stribeck part can be judged and the two directions lie
+over each other. A run that was left out stays visible, as a hollow mark.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
@@ -14,21 +15,23 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
+from ident.friction_map import MapPoint
+from ident.model.friction import StribeckCurve
 from ident.model.robot import OneLinkRobot
 from pipelines.report.axis_units import units_of
-from pipelines.report.drawn_values import DrawnPoint
-from pipelines.report.style import BLUE, INK, MUTED, VERMILLION, new_figure, styled, zero_lines
+from pipelines.report.style import BLUE, INK, VERMILLION, key, new_figure, styled, zero_lines
 
-_COLOUR: Final = {"positive": BLUE, "negative": VERMILLION}
-_SIGN: Final = {"positive": 1.0, "negative": -1.0}
-_ARROW: Final = {"positive": "$\\dot{q} > 0$", "negative": "$\\dot{q} < 0$"}
+_COLOUR: Final = {1: BLUE, -1: VERMILLION}
+_NAME: Final = {1: "$\\dot{q} > 0$", -1: "$\\dot{q} < 0$"}
 _STRIBECK_RANGE: Final = 10.0  # Stribeck velocities that the right panel shows
+_WIDE: Final = 1.96  # standard errors to either side of a 95 % bar
 
 
 @styled
 def figure2(
-    points: Sequence[DrawnPoint],
+    points: Sequence[MapPoint],
     robot: OneLinkRobot | None,
     *,
     title: str = "Friction measurements and friction model",
@@ -39,14 +42,86 @@ def figure2(
 
     Without a robot (a parameter was withheld) the measurements stand alone.
     """
+    drawn = [point for point in points if math.isfinite(point.velocity) and math.isfinite(point.torque)]
     figure = new_figure(title, height=3.9, simulated=simulated)
-    whole, slow = figure.subplots(1, 2, width_ratios=(1.0, 1.0))
+    whole, slow = figure.subplots(1, 2, width_ratios=(1.0, 1.1))
     units = units_of(axis)
-    _draw_whole(whole, points, robot)
+    _draw_whole(whole, drawn, robot)
     whole.set(xlabel=f"velocity [{units.velocity}]", ylabel=f"friction {units.effort} [{units.torque}]")
     whole.set_title("both directions")
-    _draw_slow(slow, points, robot)
-    slow.set(xlabel=f"speed [{units.velocity}]", ylabel=f"magnitude [{units.torque}]")
+    _draw_slow(slow, drawn, robot)
+    slow.set(xlabel=f"speed [{units.velocity}], logarithmic", ylabel=f"magnitude [{units.torque}]")
     slow.set_title("the Stribeck part")
-    figure.legend(handles=_legend(points, robot), loc="outside lower center", ncols=5, columnspacing=1.4)
+    handles = _legend(drawn, robot)
+    figure.legend(handles=handles, loc="outside lower center", ncols=5, columnspacing=1.3)
     return figure
+
+
+def _draw_whole(axes: Axes, points: Sequence[MapPoint], robot: OneLinkRobot | None) -> None:
+    zero_lines(axes)
+    fastest = max((abs(point.velocity) for point in points), default=1.0)
+    if robot is not None:
+        speed = np.geomspace(1e-4, 1.0, 400) * fastest * 1.03
+        for sign, curve in _curves(robot):
+            axes.plot(sign * speed, sign * curve.total(speed), color=_COLOUR[sign], zorder=3)
+        rest = (-robot.friction.negative.static_torque, robot.friction.positive.static_torque)
+        axes.plot((0.0, 0.0), rest, color=INK, linewidth=1.6, zorder=2.8)
+    for point in points:
+        _mark(axes, point, velocity=point.velocity, torque=point.torque)
+
+
+def _draw_slow(axes: Axes, points: Sequence[MapPoint], robot: OneLinkRobot | None) -> None:
+    moving = sorted(abs(point.velocity) for point in points if abs(point.velocity) > 0)
+    slowest = moving[0] if moving else 0.01
+    fastest = moving[-1] if moving else 1.0
+    if robot is not None:
+        velocities = [curve.stribeck_velocity for _, curve in _curves(robot)]
+        fastest = max(min(fastest, _STRIBECK_RANGE * max(velocities)), 2.0 * slowest)
+    floor = 0.8 * slowest  # below it the axis is linear, so that it reaches rest
+    axes.set_xscale("symlog", linthresh=floor, linscale=0.35)
+    axes.set_xlim(-0.12 * floor, 1.15 * fastest)
+    decades = np.asarray(LogLocator(subs=(1.0,)).tick_values(floor, fastest))
+    axes.xaxis.set_major_locator(FixedLocator([0.0, *decades[decades > floor]]))
+    between = np.asarray(LogLocator(subs=range(2, 10)).tick_values(floor, fastest))
+    axes.xaxis.set_minor_locator(FixedLocator(list(between[between > floor])))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    if robot is not None:
+        speed = np.concatenate(([0.0], np.geomspace(1e-2 * floor, 1.15 * fastest, 400)))
+        for direction, curve in _curves(robot):
+            axes.plot(speed, curve.total(speed), color=_COLOUR[direction], zorder=3)
+    for point in points:
+        if abs(point.velocity) <= 1.15 * fastest:
+            _mark(axes, point, velocity=abs(point.velocity), torque=point.direction * point.torque)
+
+
+def _mark(axes: Axes, point: MapPoint, *, velocity: float, torque: float) -> None:
+    colour = _COLOUR[point.direction]
+    axes.errorbar(
+        velocity,
+        torque,
+        yerr=_WIDE * point.stderr if point.used and point.stderr else None,
+        marker="D" if point.protocol == "breakaway" else "o",
+        markersize=3.4 if point.protocol == "breakaway" else 3.8,
+        color=colour,
+        markerfacecolor=colour if point.used else "none",
+        markeredgecolor=INK if point.used else colour,
+        markeredgewidth=0.35 if point.used else 1.1,
+        elinewidth=0.9,
+        capsize=0,
+        zorder=4 if point.used else 2.5,
+    )
+
+
+def _curves(robot: OneLinkRobot) -> tuple[tuple[int, StribeckCurve], tuple[int, StribeckCurve]]:
+    return (1, robot.friction.positive), (-1, robot.friction.negative)
+
+
+def _legend(points: Sequence[MapPoint], robot: OneLinkRobot | None) -> list[Line2D]:
+    line = 1.6 if robot is not None else 0.0
+    handles = [key(_NAME[sign], marker="o", colour=_COLOUR[sign], line=line) for sign in (1, -1)]
+    handles.append(key("constant velocity, with 95 % bar", marker="o"))
+    handles.append(key("breakaway", marker="D"))
+    if any(not point.used for point in points):
+        handles.append(key("left out", marker="o", hollow=True))
+    return handles

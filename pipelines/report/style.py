@@ -1,9 +1,9 @@
 """How every picture looks, and how it becomes text.
 
-A picture is a matplotlib `Figure` drawn without pyplot, so that nothing is global and nothing needs a display.
-`svg_text` writes it as SVG that is the same, byte for byte, whenever the drawn values are: the identifiers are
-salted with a constant and the date is left out. Letters are outlines, so the picture looks the same on every
-machine; its title stands in `<title>` for those who cannot see it.
+A picture is a matplotlib `Figure` drawn without pyplot, so that nothing is global and nothing needs a
+display. `svg_text` writes it as SVG that is the same, byte for byte, whenever the drawn values are: the
+identifiers are salted with a constant and the date is left out. Letters are outlines, so the picture looks
+the same on every machine; its title stands in `<title>` for those who cannot see it.
 
 Colours are Okabe and Ito's (2008), which stay apart for colour-blind readers. Each has a role, and a second
 value for dark pages: `report.html` exchanges the first for the second by name (see `page.py`).
@@ -14,17 +14,20 @@ from __future__ import annotations
 import functools
 import html
 import io
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, ParamSpec
+from typing import Any, Final, ParamSpec
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+
+from data.names import shown
 
 P = ParamSpec("P")
+_LONGEST: Final = 110  # characters of a title
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ COLOURS: Final = {
 
 WIDTH: Final = 7.2  # [in]; about 700 px on a screen, a text width on paper
 
-_STYLE: Final = {
+_STYLE: Final[dict[Any, Any]] = {  # matplotlib types every key of its settings by itself
     "font.family": "DejaVu Sans",  # comes with matplotlib
     "font.size": 9.0,
     "mathtext.fontset": "dejavusans",
@@ -128,18 +131,23 @@ def new_figure(title: str, *, height: float, subtitle: str = "", simulated: bool
 
     `height` [in]. A picture of simulated logs says so in its corner, wherever it is copied to.
     """
-    figure = Figure(figsize=(WIDTH, height), layout="constrained")
-    figure.set_label(plain(title) + (" (SIMULATED)" if simulated else ""))
-    pad = 0.14 if not subtitle else 0.0
-    figure.get_layout_engine().set(w_pad=0.06, h_pad=0.06)  # type: ignore[union-attr]  # set above
+    figure = Figure(figsize=(WIDTH, height), layout=ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.06))
     heading = plain(title)
+    figure.set_label(heading + (" (SIMULATED)" if simulated else ""))
     figure.suptitle(
         heading + ("\n" if subtitle else ""),
-        x=0.012, ha="left", va="top", fontsize=11, fontweight="bold", parse_math=False, linespacing=1.4 + pad,
+        x=0.012, ha="left", va="top", fontsize=11, fontweight="bold", parse_math=False, linespacing=1.45,
     )  # fmt: skip
     if subtitle:
         figure.text(
-            0.012, 1 - 0.33 / height, subtitle, ha="left", va="top", fontsize=8.5, color=MUTED, parse_math=False
+            0.012,
+            1 - 0.33 / height,
+            subtitle,
+            ha="left",
+            va="top",
+            fontsize=8.5,
+            color=MUTED,
+            parse_math=False,
         )
     if simulated:
         figure.text(
@@ -156,9 +164,22 @@ def zero_lines(axes: Axes, *, vertical: bool = False) -> None:
         axes.axvline(0.0, color=MUTED, linewidth=0.7, zorder=0.9)
 
 
+def key(label: str, *, marker: str, colour: str = INK, hollow: bool = False, line: float = 0.0) -> Line2D:
+    """A legend's entry: a mark, hollow or filled, on a line of the given width or on none."""
+    return Line2D(
+        [], [], marker=marker, color=colour, markerfacecolor="none" if hollow else colour, markersize=5.5,
+        linewidth=line, linestyle="-" if line else "none", label=label,
+    )  # fmt: skip
+
+
 def plain(text: str) -> str:
-    """Text that came from outside, fit to be drawn: control characters become a visible replacement mark."""
-    return re.sub(r"[^\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "\N{REPLACEMENT CHARACTER}", text)
+    """Text that came from outside, fit to be drawn: one line, control characters as escapes."""
+    return shown(text, _LONGEST)
+
+
+def no_math(text: str) -> str:
+    """The same for texts where matplotlib reads `$` as the beginning of a formula."""
+    return plain(text).replace("$", r"\$")
 
 
 def svg_text(figure: Figure) -> str:
@@ -166,7 +187,7 @@ def svg_text(figure: Figure) -> str:
     buffer = io.StringIO()
     nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
     with mpl.rc_context(_STYLE):
-        FigureCanvasSVG(figure).print_svg(buffer, metadata=nothing)
+        figure.savefig(buffer, format="svg", metadata=nothing)
     text = buffer.getvalue()
     title = html.escape(str(figure.get_label()), quote=True)
     start = text.index("<svg ")
