@@ -13,6 +13,10 @@ Two decorators:
   vector field. They are compiled into the `compiled` kernel that calls them and are cached with it, not
   by themselves: numba identifies a function argument by the process that made it.
 
+A function argument is given as `passed(kernel)`. Its type alone says which function it is; it has no
+value at run time. (numba's own function arguments carry the address of a Python object, which no cache
+can keep.)
+
 Both follow IEEE arithmetic to the letter (no fused or reordered operations, division by zero gives inf or
 nan): some invariants of the systems solved here hold bit for bit. Both release the interpreter lock.
 """
@@ -24,12 +28,17 @@ import types
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core import types as numba_types
 from numba.core.caching import FunctionCache
+from numba.core.datamodel.models import OpaqueModel
+from numba.core.datamodel.registry import register_default
 from numba.core.dispatcher import Dispatcher
+from numba.core.imputils import lower_constant
+from numba.core.typing.typeof import typeof_impl
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -45,6 +54,36 @@ def compiled(function: Callable[P, R]) -> Callable[P, R]:
 def specialised(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` into each kernel that calls it; its arguments may be compiled functions."""
     return numba.njit(error_model="numpy", nogil=True)(function)
+
+
+def passed(kernel: Callable[P, R]) -> Callable[P, R]:
+    """A kernel as an argument for `specialised` kernels."""
+    return cast("Callable[P, R]", _Passed(kernel))
+
+
+class _Passed:
+    def __init__(self, kernel: Callable[..., Any]) -> None:
+        self.kernel = cast("Dispatcher[Callable[..., Any]]", kernel)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self.kernel(*arguments)
+
+
+class _PassedType(numba_types.Dispatcher):
+    """The type of a passed kernel: which kernel it is, and nothing else."""
+
+
+register_default(_PassedType)(OpaqueModel)
+
+
+@typeof_impl.register(_Passed)
+def _type_of_passed(value: _Passed, _context: object) -> _PassedType:
+    return _PassedType(value.kernel)
+
+
+@lower_constant(_PassedType)  # type: ignore[no-untyped-call, untyped-decorator]  # numba leaves its lowering untyped
+def _passed_at_run_time(context: Any, _builder: object, _type: object, _value: object) -> Any:
+    return context.get_dummy_value()
 
 
 class _ReachingCache(FunctionCache):
@@ -76,17 +115,25 @@ def reach_digest(function: Callable[..., object]) -> str:
         seen.add(current)
         files.add(current.__code__.co_filename)
         for name, value in sorted(_reached(current), key=lambda pair: pair[0]):
-            if isinstance(value, Dispatcher):
-                pending.append(value.py_func)
-            elif isinstance(value, tuple) and any(isinstance(item, Dispatcher) for item in value):
-                pending.extend(item.py_func for item in value if isinstance(item, Dispatcher))
-            elif isinstance(value, np.ndarray):
-                digest.update(f"{name}{value.dtype}{value.shape}".encode() + value.tobytes())
-            elif isinstance(value, (bool, int, float, complex, str, tuple)):
-                digest.update(f"{name}={value!r}".encode())
+            for item in _flat(value):
+                kernel = item.kernel if isinstance(item, _Passed) else item
+                if isinstance(kernel, Dispatcher):
+                    pending.append(kernel.py_func)
+                elif isinstance(item, np.ndarray):
+                    digest.update(f"{name}{item.dtype}{item.shape}".encode() + item.tobytes())
+                elif isinstance(item, (bool, int, float, complex, str)):
+                    digest.update(f"{name}={item!r}".encode())
     for file in sorted(files):
         digest.update(_contents(file))
     return digest.hexdigest()
+
+
+def _flat(value: Any) -> Iterator[Any]:
+    if isinstance(value, tuple):
+        for item in value:
+            yield from _flat(item)
+    else:
+        yield value
 
 
 def _reached(function: Callable[..., object]) -> Iterator[tuple[str, Any]]:

@@ -1,0 +1,211 @@
+"""The closed loop, inclusion (8): the robot with its true law under a controller with its own.
+
+    J v' = -n1 x1 - n2 x2 + r F^(x2) - b v - F(v),    x1' = v = x2 + x3
+    J^ x2' = -n1 x1 - (b^ + n2) x2 + J^ L x3
+
+with hats for what the controller believes. Where the model is the robot, subtracting the two gives the
+paper's x3' = -(b/J + L) x3 + (r F(x2) - F(v))/J. The solution is exact but for the tolerance of its
+smooth pieces: friction is set-valued, a stick is a stick, and its end is found to rounding
+(`loop_modes`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from compensation.controller import Controller
+from compensation.loop_modes import COLUMNS, MOTION, ROWS, mode_table
+from compensation.loop_runs import begin, is_analytic, run_dormand_prince, run_series
+from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
+from ident.model.robot import OneLinkRobot
+from ident.simulation.filippov_system import FloatArray, Signs
+from ident.simulation.integrate import END_REASONS, EVENTS_FULL, Progress
+from ident.simulation.trajectory import Event, Trajectory
+
+GRID_RATE = 200.0  # [1/s] of the times chosen where none are asked for
+GRID_LIMIT = 20_000
+EVENT_STORE = 1024
+STEP_LIMIT = 1_000_000
+
+
+@dataclass(frozen=True)
+class ClosedLoop:
+    """A robot and its controller: true friction and compensated friction are two values."""
+
+    robot: OneLinkRobot
+    controller: Controller
+
+
+def simulate(
+    loop: ClosedLoop,
+    start: ArrayLike,
+    *,
+    duration: float,
+    times: ArrayLike | None = None,
+    tolerance: float = 1e-10,
+) -> Trajectory:
+    """Solve inclusion (8) from `start` (3,) = (x1 [rad], x2 [rad/s], x3 [rad/s]) for `duration` [s].
+
+    States are given at `times` (k,) [s], ascending within [0, duration]; without them on a grid that includes
+    every event and both ends. `tolerance` bounds the error of a step relative to the largest state.
+
+    Raises
+    ------
+    ModelError
+        If a start, time or tolerance is no number, or times run backwards or out of the duration.
+    """
+    state = _checked_start(start)
+    if not (math.isfinite(duration) and duration > 0):
+        raise ModelError(f"duration is {duration}: a positive number of seconds")
+    if not 0 < tolerance < 1:
+        raise ModelError(f"tolerance is {tolerance}: between 0 and 1, relative to the state")
+    if times is None:
+        _, found = _run(loop, state, np.empty(0), np.empty((0, 3)), duration, tolerance)
+        points = min(GRID_LIMIT, max(2, math.ceil(duration * GRID_RATE)))
+        grid = np.linspace(0.0, duration, points + 1)
+        wanted = np.union1d(grid, [event.time for event in found])
+    else:
+        wanted = _checked_times(times, duration)
+    states = np.empty((wanted.size, 3))
+    end, events = _run(loop, state, wanted, states, duration, tolerance)
+    states[end.outputs :] = np.nan
+    return Trajectory(
+        time=wanted,
+        state=states,
+        events=tuple(events),
+        end_reason=END_REASONS[end.reason],
+        end_time=end.time,
+        end_state=end.state,
+    )
+
+
+def torque(loop: ClosedLoop, states: ArrayLike) -> FloatArray:
+    """Torque u = -n1 x1 - n2 x2 + r F^(x2) [N m] that the controller gives at states (k, 3). Eqs (5)-(6).
+
+    At x2 = 0 the compensation is set-valued; its middle, 0 for a symmetric law, is given.
+    """
+    x = np.atleast_2d(np.asarray(states, dtype=np.float64))
+    gains = loop.controller.gains
+    low, high = loop.controller.model.friction.torque_interval(x[:, 1])
+    feedback: FloatArray = -gains.proportional * x[:, 0] - gains.derivative * x[:, 1]
+    return feedback + gains.compensation * 0.5 * (low + high)
+
+
+@lru_cache(maxsize=1024)
+def mode_parameters(loop: ClosedLoop) -> FloatArray:
+    """The numbers of all modes, as `loop_modes` reads them: (6, 16), not to be written to."""
+    laws = np.array([*_rows(loop.robot.friction), *_rows(loop.controller.model.friction)])
+    inertia = np.array([loop.robot.inertia, loop.controller.model.inertia])
+    gains = loop.controller.gains
+    parameters = np.zeros((ROWS, COLUMNS))
+    mode_table(
+        laws,
+        inertia,
+        np.array([gains.proportional, gains.derivative, gains.observer, gains.compensation]),
+        parameters,
+    )
+    return parameters
+
+
+def _rows(friction: StribeckFriction) -> tuple[tuple[float, ...], ...]:
+    return tuple(_row(curve) for curve in (friction.positive, friction.negative))
+
+
+def _row(curve: StribeckCurve) -> tuple[float, ...]:
+    return (
+        curve.static_torque,
+        curve.coulomb_torque,
+        curve.stribeck_velocity,
+        curve.viscous_damping,
+        # without a Stribeck effect the shape is nobody's business: 1 keeps the mode analytic
+        curve.stribeck_shape if curve.stribeck_torque > 0.0 else 1.0,
+    )
+
+
+@dataclass(frozen=True)
+class _End:
+    time: float
+    reason: int
+    outputs: int
+    state: FloatArray
+
+
+def _run(
+    loop: ClosedLoop,
+    start: FloatArray,
+    times: FloatArray,
+    states: FloatArray,
+    duration: float,
+    tolerance: float,
+) -> tuple[_End, list[Event]]:
+    parameters = mode_parameters(loop)
+    run = run_series if is_analytic(parameters) else run_dormand_prince
+    state, signs, contact = start.copy(), np.empty(2, np.int64), np.empty(2, np.int64)
+    begin(parameters, state, signs, contact)
+    events: list[Event] = []
+    moving = int(signs[MOTION])
+    time, steps = 0.0, STEP_LIMIT
+    while True:
+        store = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64), np.empty((EVENT_STORE, 2), np.int64)
+        at = np.empty((EVENT_STORE, 3))
+        progress: Progress = run(
+            parameters,
+            tolerance,
+            duration,
+            steps,
+            -1,
+            0,
+            0,
+            time,
+            state,
+            signs,
+            contact,
+            times,
+            states,
+            *store,
+            at,
+        )
+        moving = _named(progress, store, at, moving, events)
+        time, steps = progress.time, steps - progress.steps
+        if progress.reason != EVENTS_FULL:
+            return _End(progress.time, progress.reason, progress.outputs, state), events
+
+
+def _named(
+    progress: Progress,
+    store: tuple[FloatArray, Signs, Signs],
+    states: FloatArray,
+    moving: int,
+    events: list[Event],
+) -> int:
+    """Append the events of one stretch; returns the sign of v after them."""
+    for i in range(progress.events):
+        after = int(store[2][i, MOTION])
+        if store[1][i] == MOTION or after != moving:
+            kind = "stick" if after == 0 else "slip" if moving == 0 else "velocity reversal"
+        else:
+            kind = "estimate reversal"
+        events.append(Event(time=float(store[0][i]), kind=kind, state=states[i].copy()))
+        moving = after
+    return moving
+
+
+def _checked_start(start: ArrayLike) -> FloatArray:
+    state = np.array(start, dtype=np.float64)
+    if state.shape != (3,) or not np.all(np.isfinite(state)):
+        raise ModelError(f"start is {start!r}: three finite numbers x1 [rad], x2 [rad/s], x3 [rad/s] (eq 8)")
+    return state
+
+
+def _checked_times(times: ArrayLike, duration: float) -> FloatArray:
+    wanted = np.array(times, dtype=np.float64)
+    if wanted.ndim != 1 or not np.all(np.isfinite(wanted)):
+        raise ModelError("times are no list of finite numbers [s]")
+    if wanted.size and (np.any(np.diff(wanted) < 0) or wanted[0] < 0 or wanted[-1] > duration):
+        raise ModelError(f"times must ascend within 0 and the duration {duration:g} s")
+    return wanted

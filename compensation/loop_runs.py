@@ -1,0 +1,101 @@
+"""The event loop compiled for the closed loop: one kernel for each one-step method, both kept on disk.
+
+Taylor series serve Stribeck shapes of 1, Dormand and Prince's method all others (`is_analytic` decides).
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from compensation.loop_modes import SHAPE2, SHAPEV, SYSTEM, surfaces
+from ident.simulation.compiled import compiled
+from ident.simulation.dormand_prince import DORMAND_PRINCE
+from ident.simulation.filippov_system import FloatArray, Signs, resolve, switching_value
+from ident.simulation.integrate import Progress, Record, Settings, integrate
+from ident.simulation.taylor import TAYLOR
+
+SLIP_MODES: Final = 4
+
+
+@compiled
+def is_analytic(parameters: FloatArray) -> bool:
+    """Whether every slip mode has a Taylor recurrence."""
+    shapes = parameters[:SLIP_MODES]
+    return bool(np.all(shapes[:, SHAPE2] == 1.0) and np.all(shapes[:, SHAPEV] == 1.0))
+
+
+@compiled
+def begin(parameters: FloatArray, state: FloatArray, signs: Signs, contact: Signs) -> None:
+    """The mode in which a state starts, into `signs` and `contact` (2,).
+
+    The origin is an equilibrium for any gains: its friction torques may take any value up to break-away, zero
+    included. (For r > 1 it is not the only solution from there; it is the one without a push.)
+    """
+    contact[:] = 0
+    if state[0] == 0.0 and state[1] == 0.0 and state[2] == 0.0:
+        signs[:] = 0
+        return
+    on = surfaces()
+    rate = np.empty(state.size)
+    for i in range(signs.size):
+        signs[i] = 1 if switching_value(on, i, state) >= 0.0 else -1
+    for i in range(signs.size):
+        if switching_value(on, i, state) == 0.0:
+            contact[i] = 1
+            signs[i] = resolve(SYSTEM, on, i, signs, state, parameters, rate)
+
+
+@compiled
+def run_series(
+    parameters: FloatArray,
+    tolerance: float,
+    end: float,
+    step_limit: int,
+    section: int,
+    section_side: int,
+    returns: int,
+    time: float,
+    state: FloatArray,
+    signs: Signs,
+    contact: Signs,
+    times: FloatArray,
+    states: FloatArray,
+    event_times: FloatArray,
+    event_surfaces: Signs,
+    event_signs: Signs,
+    event_states: FloatArray,
+) -> Progress:
+    """`integrate` by Taylor series; the arguments are its `Settings` and its `Record`, one by one."""
+    settings = Settings(tolerance, end, step_limit, section, section_side, returns)
+    record = Record(times, states, event_times, event_surfaces, event_signs, event_states)
+    return integrate(TAYLOR, SYSTEM, surfaces(), parameters, settings, time, state, signs, contact, record)
+
+
+@compiled
+def run_dormand_prince(
+    parameters: FloatArray,
+    tolerance: float,
+    end: float,
+    step_limit: int,
+    section: int,
+    section_side: int,
+    returns: int,
+    time: float,
+    state: FloatArray,
+    signs: Signs,
+    contact: Signs,
+    times: FloatArray,
+    states: FloatArray,
+    event_times: FloatArray,
+    event_surfaces: Signs,
+    event_signs: Signs,
+    event_states: FloatArray,
+) -> Progress:
+    """`integrate` by Dormand and Prince's method; arguments as for `run_series`."""
+    settings = Settings(tolerance, end, step_limit, section, section_side, returns)
+    record = Record(times, states, event_times, event_surfaces, event_signs, event_states)
+    return integrate(
+        DORMAND_PRINCE, SYSTEM, surfaces(), parameters, settings, time, state, signs, contact, record
+    )

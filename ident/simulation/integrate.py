@@ -1,0 +1,250 @@
+"""Event-driven integration of a Filippov system: from event to event, with the reason why it ended.
+
+Inside a mode a one-step method (`taylor_step`, `dormand_prince_step`) gives the solution over a step as
+polynomials. The first zero of a switching function along them ends the mode at that instant, to
+rounding; the state is put onto the surface exactly, and Filippov's rule says whether it crosses or
+slides. Slides are taken whole, in closed form.
+
+Where several switching functions vanish within rounding of each other, their values at the first event
+decide: whatever is found on the wrong side there has been reached as well, and all are resolved in the
+order of the surfaces.
+
+The loop is a kernel to be called from a compiled function that names the system and the method (see
+`compiled`), and can be resumed: it leaves time, state, signs and contacts as they stand when it ends.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from ident.simulation.compiled import compiled, specialised
+from ident.simulation.crossing import evaluate, first_crossing
+from ident.simulation.filippov_system import (
+    FilippovSystem,
+    FloatArray,
+    OneStepMethod,
+    Signs,
+    Surfaces,
+    project,
+    resolve,
+    switching_value,
+)
+from ident.simulation.taylor import MAX_ORDER
+
+TIME_REACHED: Final = 0
+EQUILIBRIUM: Final = 1
+STEP_LIMIT: Final = 2
+SECTION: Final = 3
+EVENTS_FULL: Final = 4
+END_REASONS: Final = ("time reached", "equilibrium", "step limit", "section reached", "event store full")
+
+WORK_ROWS: Final = 20
+STALLED_EVENTS: Final = 200  # events at one instant, after which the step limit is declared reached
+
+
+class Settings(NamedTuple):
+    """How to integrate and when to stop early."""
+
+    tolerance: float  # of one step, relative to the largest component of the state
+    end: float  # time at which to stop
+    step_limit: int
+    section: int  # surface whose crossings are counted, -1 for none
+    section_side: int  # from which side it must be reached: +1, -1, or 0 for both
+    returns: int  # number of crossings after which to stop
+
+
+class Record(NamedTuple):
+    """Memory for what is to be kept; all arrays may have no rows."""
+
+    times: FloatArray  # (k,) ascending, at which the state is wanted
+    states: FloatArray  # (k, n)
+    event_times: FloatArray  # (e,)
+    event_surfaces: Signs  # (e,)
+    event_signs: Signs  # (e, m) the mode after the event
+    event_states: FloatArray  # (e, n)
+
+
+class Progress(NamedTuple):
+    """Where an integration stands."""
+
+    time: float  # of the equilibrium: when the last slide began
+    reason: int  # index into END_REASONS
+    outputs: int  # how many of the wanted times are done
+    events: int  # how many events are stored
+    steps: int
+
+
+@specialised
+def integrate(
+    method: OneStepMethod,
+    system: FilippovSystem,
+    surfaces: Surfaces,
+    parameters: FloatArray,
+    settings: Settings,
+    time: float,
+    state: FloatArray,
+    signs: Signs,
+    contact: Signs,
+    record: Record,
+) -> Progress:
+    """Advance `state` (n,), `signs` (m,) and `contact` (m,) in place from `time` to the end of the settings.
+
+    Output times before `time` are left alone. A state that slides for ever is reported as an equilibrium at
+    once, with its later outputs filled in; `state` is then where it tends to.
+    """
+    n, m = state.size, signs.size
+    polynomials = np.empty((n + m, MAX_ORDER + 1))
+    work = np.empty((WORK_ROWS, max(n, MAX_ORDER + 1)))
+    after = np.empty(n)
+    wanted = record.times.size
+    output = int(np.searchsorted(record.times, time))
+    events = 0
+    found = 0
+    stalled = 0
+    suggested = 1e-2
+    for step in range(settings.step_limit):
+        if time >= settings.end:
+            return Progress(time, TIME_REACHED, output, events, step)
+        if stalled > STALLED_EVENTS:
+            return Progress(time, STEP_LIMIT, output, events, step)
+        left = settings.end - time
+        surface = -1
+        arrived_from = 0
+        if _slides(signs):
+            duration, surface, side, touching = system.slide(signs, state, parameters)
+            span = min(duration, left)
+            while output < wanted and record.times[output] <= time + span:
+                system.slide_at(signs, state, parameters, record.times[output] - time, record.states[output])
+                output += 1
+            if duration == np.inf:
+                system.slide_at(signs, state, parameters, np.inf, after)
+                state[:] = after
+                return Progress(time, EQUILIBRIUM, output, events, step)
+            system.slide_at(signs, state, parameters, span, after)
+            state[:] = after
+            stalled = stalled + 1 if time + span == time else 0
+            if duration > left:
+                time = settings.end
+                continue
+            time += span
+            _release(system, surfaces, parameters, surface, side, touching, state, signs, contact, work[0])
+        else:
+            length, degree, suggested = method.step(
+                system, signs, state, parameters, settings.tolerance, left, suggested, polynomials, work
+            )
+            _switching_polynomials(surfaces, n, degree, polynomials)
+            part = 1.0
+            for i in range(m):
+                at = first_crossing(polynomials[n + i], degree, signs[i], contact[i], work[0])
+                if at <= part and (surface < 0 or at < part):
+                    part = at
+                    surface = i
+            if surface >= 0 and part < 1.0:
+                length, part = method.end_at(
+                    system, surfaces, surface, signs, state, parameters, length, part, polynomials, work
+                )
+            span = part * length
+            now = settings.end if span == left else time + span
+            while output < wanted and record.times[output] <= now:
+                inside = min((record.times[output] - time) / length, part)
+                evaluate(polynomials, n, degree, inside, record.states[output])
+                output += 1
+            evaluate(polynomials, n, degree, part, after)
+            stalled = stalled + 1 if now == time else 0
+            time = now
+            state[:] = after
+            for i in range(m):
+                contact[i] = 0
+            if surface < 0:
+                continue
+            arrived_from = signs[surface]
+            _meet(system, surfaces, parameters, surface, state, signs, contact, work[0])
+        if events < record.event_times.size:
+            record.event_times[events] = time
+            record.event_surfaces[events] = surface
+            record.event_signs[events] = signs
+            record.event_states[events] = state
+            events += 1
+            if events == record.event_times.size:
+                return Progress(time, EVENTS_FULL, output, events, step + 1)
+        if surface == settings.section and arrived_from != 0:
+            if settings.section_side * arrived_from >= 0:
+                found += 1
+            if found == settings.returns:
+                return Progress(time, SECTION, output, events, step + 1)
+    return Progress(time, STEP_LIMIT, output, events, settings.step_limit)
+
+
+@compiled
+def _slides(signs: Signs) -> bool:
+    return bool(np.any(signs == 0))
+
+
+@specialised
+def _switching_polynomials(surfaces: Surfaces, n: int, degree: int, polynomials: FloatArray) -> None:
+    """Switching functions along a step into the rows after the states."""
+    for i in range(surfaces.pivots.size):
+        row = polynomials[n + i]
+        row[: degree + 1] = 0.0
+        row[0] = surfaces.rows[i, n]
+        for j in range(n):
+            factor = surfaces.rows[i, j]
+            if factor != 0.0:
+                for k in range(degree + 1):
+                    row[k] += factor * polynomials[j, k]
+
+
+@specialised
+def _meet(
+    system: FilippovSystem,
+    surfaces: Surfaces,
+    parameters: FloatArray,
+    surface: int,
+    state: FloatArray,
+    signs: Signs,
+    contact: Signs,
+    rate: FloatArray,
+) -> None:
+    """A surface was reached: put the state onto it, and onto all others reached with it, and resolve them."""
+    project(surfaces, surface, state)
+    reached = 0
+    for i in range(signs.size):
+        if i == surface or signs[i] * switching_value(surfaces, i, state) <= 0.0:
+            contact[i] = 1
+            reached += 1
+    if reached > 1:
+        for i in range(signs.size):
+            if contact[i] == 1:
+                project(surfaces, i, state)
+    for i in range(signs.size):
+        if contact[i] == 1:
+            signs[i] = resolve(system, surfaces, i, signs, state, parameters, rate[: state.size])
+
+
+@specialised
+def _release(
+    system: FilippovSystem,
+    surfaces: Surfaces,
+    parameters: FloatArray,
+    surface: int,
+    side: int,
+    touching: int,
+    state: FloatArray,
+    signs: Signs,
+    contact: Signs,
+    rate: FloatArray,
+) -> None:
+    """A slide has ended at `surface`, towards `side`: resolve what else the state lies on."""
+    for i in range(signs.size):
+        contact[i] = 1 if signs[i] == 0 else 0
+    signs[surface] = side
+    contact[surface] = touching
+    for i in range(signs.size):
+        if contact[i] > 0:
+            project(surfaces, i, state)
+    for i in range(signs.size):
+        if i != surface and switching_value(surfaces, i, state) == 0.0:
+            contact[i] = 1
+            signs[i] = resolve(system, surfaces, i, signs, state, parameters, rate[: state.size])
