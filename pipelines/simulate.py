@@ -1,0 +1,166 @@
+"""simulate: one run of the closed loop, as numbers over time.
+
+`trajectory.csv` has the columns `t,x1,x2,x3,v,u` in SI: x1 = q, x2 the velocity estimate, x3 the observer
+error, v = x2 + x3 the velocity, u the torque on the link. Every number reads back bit for bit, and the last
+row stands at t = T.
+
+Without a sample period the run is a solution of inclusion (8), event by event. With one it is the loop as a
+rig runs it: rows at the sampling instants, the estimate and the torque held in between, and a last row at T.
+"""
+
+from __future__ import annotations
+
+import math
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+
+from compensation.closed_loop import ClosedLoop, simulate, torque
+from compensation.controller import Controller
+from compensation.sampled_loop import Sampling, run_sampled
+from data.mcap_log import write_mcap
+from data.recording import FloatArray
+from ident.model.robot import OneLinkRobot
+from ident.response import respond
+from pipelines.exit_status import RefusalError, UsageError
+from pipelines.results import ResultFolder
+
+Format = Literal["csv", "mcap"]
+HEADER: Final = ("t", "x1", "x2", "x3", "v", "u")
+OUTPUT_STEP: Final = 1e-3  # [s] between the rows of a continuous run
+MOST_ROWS: Final = 200_000  # of a continuous run
+MOST_SAMPLES: Final = 5_000_000  # of a sampled run
+_START_WORDS: Final = 3
+
+
+@dataclass(frozen=True)
+class SimulatedRun:
+    """One run; every array has a row a moment."""
+
+    time: FloatArray  # (n,) [s], from 0 to the duration
+    state: FloatArray  # (n, 3): x1 [rad], x2 and x3 [rad/s]
+    torque: FloatArray  # (n,) [N m]
+    loop: str  # which loop it is, in words
+    end: str  # how it ended, in words
+
+    @property
+    def velocity(self) -> FloatArray:
+        """v = x2 + x3 (n,) [rad/s]."""
+        return np.asarray(self.state[:, 1] + self.state[:, 2])
+
+
+def parse_start(text: str) -> tuple[float, float, float]:
+    """`x1,x2,x3` as the command line gives it [rad, rad/s, rad/s]; raises `UsageError`."""
+    words = text.split(",")
+    try:
+        values = [float(word) for word in words]
+    except ValueError:
+        values = []
+    if len(values) != _START_WORDS or not all(map(math.isfinite, values)):
+        raise UsageError(f"--x0 is {text!r}: give three finite numbers, x1,x2,x3 [rad, rad/s, rad/s]")
+    return values[0], values[1], values[2]
+
+
+def parse_format(word: str) -> Format:
+    """The format of the trajectory; raises `UsageError`."""
+    if word in {"csv", "mcap"}:
+        return "csv" if word == "csv" else "mcap"
+    later = "parquet is not written yet" if word == "parquet" else f"{word!r} is no format"
+    raise UsageError(f"--format: {later}; give csv or mcap")
+
+
+def simulate_loop(
+    robot: OneLinkRobot,
+    controller: Controller,
+    *,
+    start: tuple[float, float, float],
+    duration: float,
+    sampling: Sampling | None = None,
+) -> SimulatedRun:
+    """One run from `start` (x1, x2, x3) for `duration` [s]; raises `UsageError` for what cannot be run."""
+    if not (math.isfinite(duration) and duration > 0):
+        raise UsageError(f"--duration is {duration:g}: give a finite number of seconds > 0")
+    if sampling is None:
+        return _continuous(robot, controller, start, duration)
+    return _sampled(robot, controller, sampling, start=start, duration=duration)
+
+
+def write_trajectory(run: SimulatedRun, folder: ResultFolder, *, form: Format = "csv") -> Path:
+    """trajectory.csv, or trajectory.mcap: joint states, marked as simulated, and x2 on its own topic."""
+    if form == "csv":
+        table = np.column_stack((run.time, run.state, run.velocity, run.torque))
+        return folder.write_csv("trajectory.csv", HEADER, table.tolist())
+    with tempfile.TemporaryDirectory() as scratch:
+        path = Path(scratch) / "trajectory.mcap"
+        write_mcap(
+            path,
+            time=run.time,
+            position=np.ascontiguousarray(run.state[:, 0]),
+            velocity=run.velocity,
+            effort=run.torque,
+            metadata={"simulated": "true", "loop": run.loop},
+            extra={"/velocity_estimate": np.ascontiguousarray(run.state[:, 1])},
+        )
+        return folder.write_bytes("trajectory.mcap", path.read_bytes())
+
+
+def _continuous(
+    robot: OneLinkRobot, controller: Controller, start: tuple[float, float, float], duration: float
+) -> SimulatedRun:
+    rows = min(math.ceil(duration / OUTPUT_STEP), MOST_ROWS) + 1
+    loop = ClosedLoop(robot, controller)
+    found = simulate(loop, start, times=np.linspace(0.0, duration, rows), duration=duration)
+    if not np.all(np.isfinite(found.state)):
+        raise RefusalError(
+            f"the run stopped at t = {found.end_time:.6g} s of {duration:g} s ({found.end_reason}): nothing "
+            "is written. Ask for a shorter --duration"
+        )
+    return SimulatedRun(
+        time=found.time,
+        state=found.state,
+        torque=torque(loop, found.state),
+        loop="continuous: inclusion (8)",
+        end=found.end_reason,
+    )
+
+
+def _sampled(
+    robot: OneLinkRobot,
+    controller: Controller,
+    sampling: Sampling,
+    *,
+    start: tuple[float, float, float],
+    duration: float,
+) -> SimulatedRun:
+    if start[1] != 0.0:
+        raise UsageError(
+            f"--x0 has x2 = {start[1]:g}: a sampled controller starts with the estimate x2 = 0 (the velocity "
+            "is then x3). Give 0, or --sample-period 0 for the continuous loop"
+        )
+    if duration / sampling.period > MOST_SAMPLES:
+        raise UsageError(
+            f"--duration {duration:g} at a sample period of {sampling.period:g} s is more than "
+            f"{MOST_SAMPLES:,} samples: ask for less"
+        )
+    run = run_sampled(robot, controller, sampling, start=(start[0], start[2]), duration=duration)
+    time, position, velocity = run.time, run.position, run.velocity
+    estimate, held = run.estimate, run.torque
+    rest = duration - float(time[-1])
+    if rest <= 1e-9 * sampling.period:
+        time = np.append(time[:-1], duration)
+    else:
+        q, v = respond(robot, start=(float(position[-1]), float(velocity[-1])), torque=held[-1:], period=rest)
+        time = np.append(time, duration)
+        position, velocity = np.append(position, q[-1]), np.append(velocity, v[-1])
+        estimate, held = np.append(estimate, estimate[-1]), np.append(held, held[-1])
+    counts = f"counts of {sampling.resolution:.6g} rad" if sampling.resolution else "exact positions"
+    return SimulatedRun(
+        time=time,
+        state=np.column_stack((position, estimate, velocity - estimate)),
+        torque=held,
+        loop=f"sampled every {sampling.period:g} s, {counts}, torque held",
+        end="the duration was reached",
+    )
