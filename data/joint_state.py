@@ -55,21 +55,24 @@ class Layout:
     """The shape shared by all messages of one topic: what never changes, and where the numbers stand."""
 
     template: ByteArray  # (size,) a message whose numbers are zero
-    fixed: NDArray[np.intp]  # offsets of the bytes that must equal the template
+    fixed: tuple[tuple[int, int], ...]  # stretches of bytes that must equal the template
     frame: str
     names: tuple[str, ...]
-    position: int | None  # byte offset of the first number; None: the array is empty
-    velocity: int | None
-    effort: int | None
+    counts: tuple[int, int, int]  # lengths of position, velocity and effort
+    places: tuple[int, int, int]  # byte offsets of their first numbers; 0 where empty
 
     @property
     def size(self) -> int:
         """Bytes in a message."""
         return self.template.size
 
-    def offset(self, signal: str) -> int | None:
-        """Byte offset of a signal's first number, None where its array is empty."""
-        return {"position": self.position, "velocity": self.velocity, "effort": self.effort}[signal]
+    def count(self, signal: str) -> int:
+        """How many numbers a signal's array holds."""
+        return self.counts[SIGNALS.index(signal)]
+
+    def place(self, signal: str) -> int:
+        """Byte offset of a signal's first number."""
+        return self.places[SIGNALS.index(signal)]
 
 
 class _Shape:
@@ -77,13 +80,13 @@ class _Shape:
 
     def __init__(self) -> None:
         self.content = bytearray(_ENCAPSULATION)
-        self.fixed: list[int] = list(range(_STAMP))
+        self.fixed: list[tuple[int, int]] = [(0, _STAMP)]
 
     def align(self, size: int) -> None:
         self.content += bytes(-(len(self.content) - _STAMP) % size)
 
     def keep(self, raw: bytes) -> None:
-        self.fixed += range(len(self.content), len(self.content) + len(raw))
+        self.fixed.append((len(self.content), len(self.content) + len(raw)))
         self.content += raw
 
     def count(self, value: int) -> None:
@@ -94,10 +97,10 @@ class _Shape:
         self.count(len(text) + 1)
         self.keep(text + b"\0")
 
-    def numbers(self, count: int) -> int | None:
+    def numbers(self, count: int) -> int:
         self.count(count)
         if not count:
-            return None
+            return 0
         self.align(8)
         where = len(self.content)
         self.content += bytes(8 * count)
@@ -115,12 +118,11 @@ def layout(*, frame: str, names: tuple[str, ...], counts: tuple[int, int, int]) 
     position, velocity, effort = (shape.numbers(count) for count in counts)
     return Layout(
         template=np.frombuffer(bytes(shape.content), np.uint8),
-        fixed=np.array(shape.fixed, np.intp),
+        fixed=tuple(shape.fixed),
         frame=frame,
         names=names,
-        position=position,
-        velocity=velocity,
-        effort=effort,
+        counts=counts,
+        places=(position, velocity, effort),
     )
 
 
@@ -143,13 +145,87 @@ def encode(shape: Layout, *, stamp: NDArray[np.int64], signals: dict[str, FloatA
     _put(rows, _STAMP, seconds.astype("<i4"))
     _put(rows, _STAMP + 4, nanoseconds.astype("<u4"))
     for signal, values in signals.items():
-        where = shape.offset(signal)
-        if where is None:
-            raise LogError(f"the message layout has no {signal}")
-        _put(rows, where, values.astype("<f8"))
+        if shape.count(signal) != 1:
+            raise LogError(f"the message layout has {shape.count(signal)} numbers in {signal}, not 1")
+        _put(rows, shape.place(signal), values.astype("<f8"))
     return rows
 
 
 def _put(rows: ByteArray, offset: int, values: NDArray[np.generic]) -> None:
     width = values.dtype.itemsize
     rows[:, offset : offset + width] = np.ascontiguousarray(values).view(np.uint8).reshape(-1, width)
+
+
+def recognise(message: bytes) -> Layout | None:
+    """The layout that a message has, None when it is not one that can be proved byte by byte."""
+    try:
+        frame, names, counts = _read_shape(message)
+        shape = layout(frame=frame, names=names, counts=counts)
+    except (struct.error, UnicodeDecodeError, ValueError):
+        return None
+    return shape if shape.size == len(message) else None
+
+
+def _read_shape(message: bytes) -> tuple[str, tuple[str, ...], tuple[int, int, int]]:
+    """Frame, joint names and array lengths; ValueError where they do not fit into the message."""
+    here = _STAMP + 8
+
+    def count(size: int) -> int:
+        nonlocal here
+        here += -(here - _STAMP) % 4
+        (value,) = struct.unpack_from("<I", message, here)
+        here += 4
+        if value * size > len(message) - here:
+            raise ValueError(f"{value} elements do not fit")
+        return int(value)
+
+    def string() -> str:
+        nonlocal here
+        length = count(1)
+        raw = message[here : here + length]
+        here += length
+        if not raw.endswith(b"\0"):
+            raise ValueError("a string without its NUL")
+        return raw[:-1].decode()
+
+    def numbers() -> int:
+        nonlocal here
+        length = count(8)
+        if length:
+            here += -(here - _STAMP) % 8 + 8 * length
+        return length
+
+    frame = string()
+    names = tuple(string() for _ in range(count(4)))
+    return frame, names, (numbers(), numbers(), numbers())
+
+
+def matches(shape: Layout, rows: ByteArray) -> NDArray[np.bool_]:
+    """For each message of `rows` (n, size), whether every fixed byte is the layout's: (n,)."""
+    same = np.ones(rows.shape[0], np.bool_)
+    for begin, end in shape.fixed:
+        same &= (rows[:, begin:end] == shape.template[begin:end]).all(axis=1)
+    return same
+
+
+def stamps(rows: ByteArray) -> NDArray[np.int64]:
+    """Header stamps (n,) [ns] of messages (n, size)."""
+    seconds = np.ascontiguousarray(rows[:, _STAMP : _STAMP + 4]).view("<i4").reshape(-1)
+    rest = np.ascontiguousarray(rows[:, _STAMP + 4 : _STAMP + 8]).view("<u4").reshape(-1)
+    return seconds.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
+
+
+def numbers(rows: ByteArray, place: int) -> FloatArray:
+    """The numbers (n,) at byte `place` of messages (n, size)."""
+    column: FloatArray = np.ascontiguousarray(rows[:, place : place + 8]).view("<f8").reshape(-1)
+    return column
+
+
+def is_joint_state(name: str, text: str) -> bool:
+    """Whether a ros2msg schema is this message's, comments and blank lines aside."""
+    return name == SCHEMA_NAME and _definitions(text) == _definitions(SCHEMA)
+
+
+def _definitions(text: str) -> list[str]:
+    lines = (" ".join(line.split("#", 1)[0].split()) for line in text.splitlines())
+    return [line for line in lines if line and not line.startswith("===")]

@@ -1,0 +1,93 @@
+"""What can be proved of a file: verified, absent or failed; and what is lost.
+
+A container with checksums can prove its content; one without can only be found free of contradictions. What
+is damaged is named as a `Loss`: which bytes, which stretch of time where the file says so, and why. A log
+with a loss is refused unless the user asked for what is left, and nothing is ever interpolated across one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from data.findings import Finding, LogError, Severity
+
+Checksums = Literal["verified", "absent", "failed"]
+
+
+@dataclass(frozen=True)
+class Loss:
+    """A part of the file that cannot be read."""
+
+    begin: int  # first byte
+    end: int  # one past the last byte
+    why: str
+    time_range: tuple[int, int] | None = None  # [ns] log times, where the file tells them
+
+    @property
+    def text(self) -> str:
+        """One clause: the bytes, the time where known, and why."""
+        when = ""
+        if self.time_range is not None:
+            first, last = self.time_range
+            when = f", log time {first * 1e-9:.3f} to {last * 1e-9:.3f} s"
+        return f"bytes {self.begin} to {self.end}{when}: {self.why}"
+
+
+@dataclass(frozen=True)
+class Integrity:
+    """What the walk through a file has proved."""
+
+    checksums: Checksums
+    losses: tuple[Loss, ...] = ()
+    chunks: int = 0  # intact ones
+    messages: int = 0  # readable ones
+    time_range: tuple[int, int] | None = None  # [ns] of the readable messages
+    notes: tuple[str, ...] = ()  # oddities that cost nothing
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing is lost."""
+        return not self.losses
+
+    @property
+    def left(self) -> str:
+        """What a salvage keeps, as a clause."""
+        if not self.messages:
+            return "nothing"
+        parts = f"{self.messages} messages"
+        if self.chunks:
+            parts += f" in {self.chunks} intact chunk" + "s" * (self.chunks != 1)
+        if self.time_range is not None:
+            first, last = self.time_range
+            parts += f", {(last - first) * 1e-9:.3f} s of log time from {first * 1e-9:.3f} s"
+        return parts
+
+    def require(self, log: str, *, salvage: bool) -> tuple[Finding, ...]:
+        """Findings for what is lost, if the user asked to go on with the rest.
+
+        Raises
+        ------
+        LogError
+            When something is lost and `salvage` is False, or nothing is left.
+        """
+        if self.whole:
+            return ()
+        first = self.losses[0]
+        others = f" (and {len(self.losses) - 1} more places)" if len(self.losses) > 1 else ""
+        if not self.messages or not salvage:
+            remedy = (
+                f"`--salvage` would keep {self.left}, and interpolate nothing across what is lost."
+                if self.messages
+                else "Nothing in it can be saved; record it again or exclude it."
+            )
+            raise LogError(f"{log} is damaged at {first.text}{others}. {remedy}")
+        return tuple(
+            Finding(
+                "E-DAMAGE",
+                Severity.WARN,
+                f"salvaged: lost {loss.text}; kept {self.left}. No estimate uses what is lost",
+                log,
+            )
+            for loss in self.losses
+        )

@@ -1,0 +1,321 @@
+"""What goes wrong with a measurement before anyone estimates from it: refuse, mend or warn, and say why.
+
+Each detector here sees one run in SI and answers with findings, with mended signals, or with a refusal
+(`LogError`) that names the sample, the time, the parameter harmed and the remedy. Nothing that could be good
+data is altered: only a wrap whose other side fits, and single samples that leave the path and come back.
+
+    E-CLOCK  time does not advance                    refused
+    E-WRAP   the encoder wraps                        unwrapped where unambiguous, else refused
+    E-SPIKE  single wrong positions                   dropped and counted; refused above 1 %
+    E-GAP    lost samples, jitter                     warned; no derivative is taken across a gap
+    E-SAT    the torque sits at its limit             warned
+    E-UNIT   logged velocity is not dq/dt             refused, with the factor and the unit it looks like
+    E-SIGN   the torque takes work out of the link    refused
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from data.findings import Finding, LogError, Severity
+from data.protocols import IDENTIFIES, ProtocolName
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+FEWEST_SAMPLES: Final = 10
+GAP: Final = 3.0  # median steps
+_SPIKE_WINDOW: Final = 25  # samples on either side for the local spread
+_LOOKS_LIKE: Final = (
+    (180.0 / math.pi, "the velocity looks like deg/s", "deg/s"),
+    (30.0 / math.pi, "the velocity looks like rpm", "rpm"),
+    (0.5 / math.pi, "the velocity looks like rev/s", "rev/s"),
+    (1000.0, "the velocity looks like thousandths (mrad/s or mm/s)", "mrad/s"),
+    (math.pi / 180.0, "the position looks like degrees", "deg"),
+    (2.0 * math.pi, "the position looks like revolutions", "rev"),
+    (1e-3, "the position looks like thousandths (mrad or mm)", "mrad"),
+    (6.0, "the position looks like degrees and the velocity like rpm, or the other way round", "deg/s"),
+)
+
+
+@dataclass(frozen=True)
+class Signals:
+    """One run in SI as it is screened; arrays are (n,)."""
+
+    log: str
+    protocol: ProtocolName
+    time: FloatArray  # [s]
+    position: FloatArray  # [rad]
+    torque: FloatArray  # [N m]
+    velocity: FloatArray | None  # [rad/s]
+    reference: FloatArray | None  # [rad]
+
+    def named(self) -> dict[str, FloatArray]:
+        """The signals that are there, by name."""
+        pairs = {
+            "position": self.position,
+            "torque": self.torque,
+            "velocity": self.velocity,
+            "reference": self.reference,
+        }
+        return {name: array for name, array in pairs.items() if array is not None}
+
+    def keep(self, samples: BoolArray) -> Signals:
+        """The same run with some samples only."""
+        return replace(
+            self,
+            time=self.time[samples],
+            position=self.position[samples],
+            torque=self.torque[samples],
+            velocity=None if self.velocity is None else self.velocity[samples],
+            reference=None if self.reference is None else self.reference[samples],
+        )
+
+
+@dataclass(frozen=True)
+class Screened:
+    """A run that may be used, and what was seen."""
+
+    signals: Signals
+    findings: tuple[Finding, ...]
+
+
+def screen(run: Signals, *, clock: str, resolution: float | None, torque_limit: float | None) -> Screened:
+    """Screen one run.
+
+    Parameters
+    ----------
+    run
+        In SI.
+    clock
+        What its time is, for messages: "header stamps", "column 't'".
+    resolution
+        One encoder count [rad]; None: unknown.
+    torque_limit
+        Of the actuator [N m]; None: unknown.
+
+    Raises
+    ------
+    LogError
+        When a detector refuses the run.
+    """
+    require_finite(run)
+    require_samples(run)
+    require_advancing(run, clock)
+    run, wraps = unwrap(run, resolution)
+    run, spikes = drop_spikes(run, resolution)
+    require_velocity_unit(run, resolution)
+    require_torque_sign(run, resolution)
+    return Screened(run, (*wraps, *spikes, *gaps(run, clock), *saturation(run, torque_limit)))
+
+
+def require_finite(run: Signals) -> None:
+    """Refuse times and signals that are no finite numbers."""
+    for name, array in {"time": run.time, **run.named()}.items():
+        bad = np.flatnonzero(~np.isfinite(array))
+        if not bad.size:
+            continue
+        k = int(bad[0])
+        when = f", t = {run.time[k]:.6g} s" if np.isfinite(run.time[k]) else ""
+        raise LogError(
+            f"{run.log}: {name} is {array[k]} at sample {k}{when}"
+            + (f" (and {bad.size - 1} more)" if bad.size > 1 else "")
+            + f"; it would spoil {IDENTIFIES[run.protocol]}. Cut it off with `window`, or exclude the log"
+        )
+
+
+def require_samples(run: Signals) -> None:
+    """Refuse a run that is empty or too short."""
+    if run.time.size < FEWEST_SAMPLES:
+        raise LogError(
+            f"{run.log}: {run.time.size} samples; a run needs at least {FEWEST_SAMPLES} to say anything "
+            f"about {IDENTIFIES[run.protocol]}. Record it again or exclude it"
+        )
+
+
+def require_advancing(run: Signals, clock: str) -> None:
+    """E-CLOCK: refuse a clock that stands still or jumps back."""
+    bad = np.flatnonzero(np.diff(run.time) <= 0.0)
+    if not bad.size:
+        return
+    k = int(bad[0])
+    back = run.time[k] - run.time[k + 1]
+    what = "stands still" if back == 0.0 else f"jumps back by {back:.6g} s"
+    raise LogError(
+        f"{run.log}: E-CLOCK refuse: the clock ({clock}) {what} at sample {k + 1}, t = {run.time[k]:.6f} s"
+        + (f", and at {bad.size - 1} more places" if bad.size > 1 else "")
+        + "; every speed there, and so the friction map, would be wrong. Choose another `clock` or time "
+        "signal, or keep one side with `window`"
+    )
+
+
+def unwrap(run: Signals, resolution: float | None) -> tuple[Signals, tuple[Finding, ...]]:
+    """E-WRAP: undo jumps by a turn, or by a power of two counts."""
+    steps = np.diff(run.position)
+    typical = float(np.median(np.abs(steps)))
+    largest = float(np.max(np.abs(steps)))
+    for modulus in _moduli(resolution, largest):
+        jumps = np.flatnonzero(np.abs(np.abs(steps) - modulus) < 0.02 * modulus)
+        if not jumps.size or typical > 0.05 * modulus or jumps.size > 0.02 * steps.size + 4:
+            continue
+        mended = steps.copy()
+        mended[jumps] -= np.sign(steps[jumps]) * modulus
+        around = np.abs(np.stack((np.roll(mended, 1), np.roll(mended, -1))))
+        fits = np.abs(mended) <= 3.0 * around.max(axis=0) + 4.0 * (resolution or 0.0) + 1e-9 * modulus
+        if not np.all(fits[jumps]):
+            k = int(jumps[~fits[jumps]][0])
+            raise LogError(
+                f"{run.log}: E-WRAP refuse: the position jumps by {steps[k]:.6g} at t = {run.time[k]:.6g} s, "
+                f"near a turn of {modulus:.6g}, but the speeds on both sides do not fit; every speed across "
+                "it would be wrong. Cut the run there with `window`"
+            )
+        position = run.position[0] + np.concatenate(([0.0], np.cumsum(mended)))
+        position = run.position + np.rint((position - run.position) / modulus) * modulus
+        text = (
+            f"the position wraps {jumps.size} times by {modulus:.6g}, first at t = "
+            f"{run.time[jumps[0]]:.6g} s; it was unwrapped, which leaves every speed as it was"
+        )
+        return replace(run, position=position), (_warn("E-WRAP", text, run),)
+    return run, ()
+
+
+def _moduli(resolution: float | None, largest: float) -> list[float]:
+    """Sizes of a wrap that the largest step may be: a turn, or 2^n counts from 8 bits on."""
+    sizes = [2.0 * math.pi]
+    if resolution is not None and largest > 200.0 * resolution:
+        sizes.append(resolution * 2.0 ** round(math.log2(largest / resolution)))
+    return sizes
+
+
+def drop_spikes(run: Signals, resolution: float | None) -> tuple[Signals, tuple[Finding, ...]]:
+    """E-SPIKE: drop single samples that leave the path and come back.
+
+    A sample is wrong when it lies off the mean of its neighbours by more than eight times the local spread of
+    that distance, six counts, and five times the way between the neighbours.
+    """
+    q = run.position
+    off = q[1:-1] - 0.5 * (q[:-2] + q[2:])
+    distance = np.abs(off)
+    between = np.abs(q[2:] - q[:-2])
+    floor = 6.0 * (resolution or 0.0) + 1e-9 * float(np.ptp(q))
+    suspects = np.flatnonzero(
+        (distance > 5.0 * between + floor) & (distance > 8.0 * float(np.median(distance)))
+    )
+    wrong: list[int] = []
+    for k in suspects.tolist():
+        window = distance[max(0, k - _SPIKE_WINDOW) : k + _SPIKE_WINDOW + 1]
+        quiet = np.sort(window)[: int(0.75 * window.size)]
+        spread = 1.4826 * float(np.median(window))
+        if distance[k] > max(8.0 * spread, 4.0 * float(quiet[-1])) and distance[k] > floor:
+            wrong.append(k + 1)
+    if not wrong:
+        return run, ()
+    share = len(wrong) / q.size
+    seen = (
+        f"{len(wrong)} single positions of {q.size} lie off the path of their neighbours, the first by "
+        f"{off[wrong[0] - 1]:.3g} at t = {run.time[wrong[0]]:.6g} s"
+    )
+    if share > 0.01 and len(wrong) > 2:
+        raise LogError(
+            f"{run.log}: E-SPIKE refuse: {seen}; with so many wrong samples no speed can be trusted. "
+            "Mend the encoder's cable and record the run again"
+        )
+    keep = np.ones(q.size, np.bool_)
+    keep[wrong] = False
+    return run.keep(keep), (_warn("E-SPIKE", f"{seen}; they were dropped", run),)
+
+
+def gaps(run: Signals, clock: str) -> tuple[Finding, ...]:
+    """E-GAP: steps of over three medians."""
+    step = np.diff(run.time)
+    median = float(np.median(step))
+    wide = np.flatnonzero(step > GAP * median)
+    if not wide.size:
+        return ()
+    k = int(wide[np.argmax(step[wide])])
+    text = (
+        f"{wide.size} steps of the clock ({clock}) exceed {GAP:g} times the median of {median:.6g} s, the "
+        f"longest {step[k]:.6g} s at t = {run.time[k]:.6g} s; no derivative is taken across them"
+    )
+    return (_warn("E-GAP", text, run),)
+
+
+def saturation(run: Signals, torque_limit: float | None) -> tuple[Finding, ...]:
+    """E-SAT: torque at its limit, or a flat top at its largest value."""
+    size = np.abs(run.torque)
+    top = float(size.max())
+    if torque_limit is not None:
+        at_limit = size >= 0.999 * torque_limit
+        if not at_limit.any():
+            return ()
+        what = f"at the limit of {torque_limit:g}"
+    else:
+        at_limit = size == top
+        distinct = np.unique(run.torque).size
+        starts = np.count_nonzero(np.diff(at_limit.astype(np.int8), prepend=0) == 1)
+        flat = int(np.count_nonzero(at_limit))
+        long_enough = flat >= 10 * starts and flat >= 0.01 * size.size
+        if top == 0.0 or starts < 3 or not long_enough or distinct < 0.5 * size.size:
+            return ()
+        what = f"flat at its largest value, {top:.6g}"
+    k = int(np.argmax(at_limit))
+    text = (
+        f"the torque is {what} in {np.count_nonzero(at_limit)} of {size.size} samples, first at "
+        f"t = {run.time[k]:.6g} s; a saturated torque is not the one commanded, and a breakaway there is "
+        "only a lower bound of F_s. Those samples are not to be used"
+    )
+    return (_warn("E-SAT", text, run),)
+
+
+def require_velocity_unit(run: Signals, resolution: float | None) -> None:
+    """E-UNIT: refuse a logged velocity that is not the position's slope."""
+    if run.velocity is None:
+        return
+    step = np.diff(run.time)
+    way = np.cumsum(0.5 * (run.velocity[1:] + run.velocity[:-1]) * step)
+    marks = np.unique(np.linspace(0, step.size - 1, min(200, max(2, step.size // 5))).astype(int))
+    logged = np.diff(way[marks])
+    measured = np.diff(run.position[1:][marks])
+    moved = float(np.sum(measured**2))
+    if math.sqrt(moved) < 50.0 * (resolution or 0.0) + 1e-12 or float(np.sum(logged**2)) == 0.0:
+        return
+    factor = float(np.sum(logged * measured)) / moved
+    likeness = factor * math.sqrt(moved / float(np.sum(logged**2)))  # the correlation through the origin
+    if 0.8 < factor < 1.25 or abs(likeness) < 0.8:
+        return
+    looks = next((text for size, text, _ in _LOOKS_LIKE if abs(abs(factor) / size - 1.0) < 0.05), "")
+    if factor < 0.0:
+        looks = "it has the opposite sign" + (f", and {looks}" if looks else "")
+    if not looks and 0.5 < factor < 2.0:
+        return  # a filtered or lagging velocity; it is never used over the position
+    raise LogError(
+        f"{run.log}: E-UNIT refuse: velocity is {factor:#.4g} times dq/dt"
+        + (f": {looks}" if looks else "")
+        + "; every friction parameter would be off by such a factor. Correct `unit`, `scale` or `sign` of "
+        "position or velocity in [signals], or drop the velocity signal"
+    )
+
+
+def require_torque_sign(run: Signals, resolution: float | None) -> None:
+    """E-SIGN: refuse a torque that takes work out of the link over the whole run, which friction forbids."""
+    way = np.diff(run.position)
+    if float(np.sum(np.abs(way))) < 200.0 * (resolution or 0.0) + 1e-12:
+        return
+    power = 0.5 * (run.torque[1:] + run.torque[:-1]) * way
+    size = float(np.sum(np.abs(power)))
+    share = float(np.sum(power)) / size if size > 0.0 else 0.0
+    if share > -0.6:
+        return
+    raise LogError(
+        f"{run.log}: E-SIGN refuse: the torque opposes the motion (its work over the run is negative, "
+        f"{100 * share:.0f} % of its size), as if friction drove the link; every friction torque would change "
+        "sign. Set `sign = -1` on torque or position in [signals]"
+    )
+
+
+def _warn(code: str, text: str, run: Signals) -> Finding:
+    return Finding(code, Severity.WARN, text, run.log)
