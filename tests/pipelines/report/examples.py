@@ -1,0 +1,189 @@
+"""Small results to draw: the paper's robot, a handful of points, runs and branches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from data.recording import FloatArray
+from ident.friction_map import MapPoint
+from ident.model import published
+
+HOSTILE: Final = "<script>alert(1)</script>&\"'=cmd()\x1b[31m\u202e$x_1${{ 7 * 7 }}-->"
+
+
+@dataclass(frozen=True)
+class Motion:
+    time: FloatArray
+    state: FloatArray
+
+
+@dataclass(frozen=True)
+class Point:
+    value: float
+    x1_min: float
+    x1_max: float
+    amplitude: float | None
+
+
+@dataclass(frozen=True)
+class Branch:
+    kind: str
+    stable: bool
+    points: Sequence[Point]
+
+
+@dataclass(frozen=True)
+class Change:
+    value: float
+    kind: str
+
+
+@dataclass(frozen=True)
+class Diagram:
+    parameter: str
+    branches: Sequence[Branch]
+    bifurcations: Sequence[Change]
+
+
+def map_points() -> list[MapPoint]:
+    """Three speeds and a breakaway in each direction; the slowest run of each was left out."""
+    friction = published.asymmetric_robot().friction
+    return [
+        MapPoint(
+            log=f"{HOSTILE}{sign * speed:+g}",
+            protocol="breakaway" if speed == 0 else "constant_velocity",
+            direction=sign,
+            velocity=sign * speed,
+            torque=sign * float(curve.total(speed)),
+            stderr=0.003,
+            velocity_stderr=None,
+            ramp_rate=None,
+            start_time=0.0,
+            end_time=1.0,
+            used=speed != 0.006,
+            why="E-STICKSLIP" if speed == 0.006 else None,
+        )
+        for sign, curve in ((1, friction.positive), (-1, friction.negative))
+        for speed in (0.0, 0.006, 0.05, 1.5)
+    ]
+
+
+def motion() -> Motion:
+    """A decaying oscillation."""
+    time = np.linspace(0.0, 5.0, 200)
+    state = np.exp(-time)[:, None] * np.column_stack((np.cos(3 * time), -np.sin(3 * time), 0.1 * time))
+    return Motion(time, state)
+
+
+def diagram() -> Diagram:
+    """A set below r = 1, a cycle and an unstable point above."""
+    below, above = np.linspace(0.8, 1.0, 5), np.linspace(1.0, 1.3, 7)
+    return Diagram(
+        "r",
+        (
+            Branch("equilibrium_set", True, [Point(r, r - 1, 1 - r, 1 - r) for r in map(float, below)]),
+            Branch("limit_cycle", True, [Point(r, 1 - r, r - 1, r - 1) for r in map(float, above)]),
+            Branch("equilibrium", False, [Point(r, 0.0, 0.0, None) for r in map(float, above)]),
+        ),
+        (Change(1.0, "equilibrium_set_to_limit_cycle"),),
+    )
+
+
+def comparison(log: str = "run.mcap") -> dict[str, Any]:
+    """Two starts over five gains; one run is undecided, one onset has no lower end."""
+    runs = []
+    for start in (0.6, -0.1):
+        for r in (0.8, 0.9, 1.0, 1.1, 1.2):
+            rests = r < 1.0
+            seen: dict[str, Any] = {
+                "verdict": "equilibrium" if rests else "limit_cycle",
+                "position_error": 0.2 if rests else None,
+                "amplitude": None if rests else r - 0.9,
+                "x1_min": 0.2 if rests else 0.9 - r,
+                "x1_max": 0.2 if rests else r - 0.9,
+                "period": None if rests else 6.0,
+            }
+            runs.append({"log": f"{r:.2f}{log}", "r": r, "start": start, **seen, "predicted": dict(seen)})
+    runs[2]["verdict"] = "undecided"
+    onset = [
+        {"start": 0.6, "gains": {"observer": 73.5}, "recorded": [0.9, 1.1], "predicted": 0.995,
+         "predicted_interval95": [0.99, 1.0], "ideal": 0.993, "symmetric": 1.0, "reversals": [1.15]},
+        {"start": -0.1, "gains": {"observer": 73.5}, "recorded": [None, 1.0], "predicted": None,
+         "predicted_interval95": [], "ideal": None, "symmetric": 1.0, "reversals": [], "why": "no rest"},
+    ]  # fmt: skip
+    return {"runs": runs, "onset": onset, "agreement": {"verdicts": 1.0, "amplitude_rms": 0.004}}
+
+
+def estimate(value: float, unit: str, relative: float = 0.01) -> dict[str, Any]:
+    """An entry of robot.json."""
+    ends = [value * (1 - 2 * relative), value * (1 + 2 * relative)]
+    return {"value": value, "stderr": value * relative, "interval95": ends, "unit": unit,
+            "withheld": None, "fixed": False}  # fmt: skip
+
+
+def robot(log: str = "velocity/p0.10.csv") -> dict[str, Any]:
+    """robot.json of a fit that found the paper's values, but no Stribeck velocity in one direction."""
+    curves = {"positive": published.POSITIVE, "negative": published.NEGATIVE,
+              "mean": published.symmetric_robot().friction.positive}  # fmt: skip
+    document: dict[str, Any] = {
+        name: {
+            "static_torque": estimate(curve.static_torque, "N m"),
+            "coulomb_torque": estimate(curve.coulomb_torque, "N m"),
+            "stribeck_velocity": estimate(curve.stribeck_velocity, "rad/s"),
+            "stribeck_shape": {"value": 1.0, "stderr": None, "interval95": None, "unit": "1",
+                               "withheld": None, "fixed": True},
+            "viscous_damping": estimate(curve.viscous_damping, "N m s/rad"),
+        }
+        for name, curve in curves.items()
+    }  # fmt: skip
+    for name in ("negative", "mean"):
+        document[name]["stribeck_velocity"] = {
+            "value": None, "unit": "rad/s", "withheld": f"E-LOWSPEED: run 0.01 to 0.05 rad/s {HOSTILE}",
+        }  # fmt: skip
+    document["positive"]["static_torque"]["interval95"] = [0.55, None]
+    return {
+        "schema": "stribeck/robot/1", "axis": "rotary", "simulated": False,
+        "inertia": estimate(published.INERTIA, "kg m^2"), **document,
+        "torque_offset": {"value": None, "unit": "N m", "withheld": "not separable"},
+        "inertia_sources": {"frequency_response": estimate(0.026, "kg m^2")},
+        "runs": [
+            {"log": log, "sha256": "ab" * 32, "protocol": "constant_velocity", "used": True, "why": None},
+            {"log": "slow.csv", "sha256": "cd" * 32, "protocol": "constant_velocity", "used": False,
+             "why": f"E-STICKSLIP {log}"},
+        ],
+        "notes": [
+            {"code": "E-OFFSET", "severity": "warn", "text": f"seen {log}", "log": None},
+            {"code": "E-STICKSLIP", "severity": "withhold", "text": "left out", "log": log},
+        ],
+    }  # fmt: skip
+
+
+def truth() -> dict[str, Any]:
+    """truth.json of a virtual rig with the paper's robot."""
+    names = ("static_torque", "coulomb_torque", "stribeck_velocity", "stribeck_shape", "viscous_damping")
+    sides = {"positive": published.POSITIVE, "negative": published.NEGATIVE}
+    return {"inertia": published.INERTIA, **{
+        side: {name: getattr(curve, name) for name in names} for side, curve in sides.items()
+    }}  # fmt: skip
+
+
+def design() -> dict[str, Any]:
+    """design.json, with one number withheld."""
+    gain = {"value": 94.37, "unit": "1/s", "interval95": [92.0, 97.0], "withheld": None}
+    return {
+        "critical_observer_gain": {
+            "positive": gain, "worst": gain, "mean": dict(gain, value=73.07),
+            "negative": {"value": None, "unit": "1/s", "interval95": None, "withheld": f"v_s {HOSTILE}"},
+        },
+        "decay_rate": {"observer_error": dict(gain, value=-20.9), "loop": dict(gain, value=1.94)},
+        "certificates": [
+            {"robot": "both directions", "law": "mean", "hypothesis": "r = 1", "holds": True, "margin": 0.0,
+             "unit": "1", "says": HOSTILE},
+        ],
+        "recommended": {"observer_gain": 104.2, "compensation_gain": 0.94, "compensator": "per-direction",
+                        "largest_rest_error": 0.1, "why": "because", "alternatives": []},
+    }  # fmt: skip
