@@ -39,20 +39,23 @@ class Encoder:
 
 @dataclass(frozen=True)
 class TorqueChannel:
-    """What a log calls the torque: the motor's, with white noise, late by whole samples.
+    """What a log calls the torque: the motor's, with white noise, late by whole samples, in whole steps.
 
-    Raises `LogError` for a negative noise or delay.
+    Raises `LogError` for a negative noise, delay or resolution.
     """
 
     noise: float = 0.0  # standard deviation [N m]
     delay: int = 0  # samples
     offset: float = 0.0  # constant [N m]
+    resolution: float = 0.0  # one step of the converter [N m]; 0: continuous
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.noise) and self.noise >= 0) or not math.isfinite(self.offset):
             raise LogError(
                 f"torque noise {self.noise} and offset {self.offset} N m must be finite, noise >= 0"
             )
+        if not (math.isfinite(self.resolution) and self.resolution >= 0):
+            raise LogError(f"torque resolution is {self.resolution} N m: it must be finite, >= 0")
         if self.delay < 0:
             raise LogError(f"torque delay is {self.delay} samples: it must be >= 0")
 
@@ -61,4 +64,5 @@ class TorqueChannel:
         arrived.
         """
         late = np.concatenate((np.full(min(self.delay, torque.size), torque[:1]), torque))[: torque.size]
-        return np.asarray(late + self.offset + self.noise * generator.standard_normal(torque.size))
+        analog = late + self.offset + self.noise * generator.standard_normal(torque.size)
+        return analog if self.resolution == 0.0 else np.rint(analog / self.resolution) * self.resolution

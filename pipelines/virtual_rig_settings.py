@@ -18,8 +18,8 @@ speeds              magnitudes [rad/s], each played in both directions; 14 in ra
 speed_loop          {damping, stiffness, integral, filter}: the speed loop; scaled from the robot
 multisine           {bias, lowest, highest, lines, period, periods, realisations, swing}
 compensation_gains  r of the set-point runs; 0.8 to 1.3
-starts              positions from which each r is run, at rest [rad]; 0.6, -0.6, 0.1, -0.1
-duration            of a set-point run [s]; 30
+starts              positions from which each r is run, at rest [rad]; far and near, scaled by F_s / n1
+duration            of a set-point run [s]; 19 periods 2 pi sqrt(J / n1), at least 10
 json_protocols      protocols whose MCAP logs are JSON, the others being CDR; frequency_response
 seed                of the noise and the phases; 1
 """
@@ -148,11 +148,9 @@ class VirtualRig(_Table):
         1.2,
         1.3,
     )
-    starts: Annotated[tuple[Number, ...], Field(min_length=1, strict=False)] = (0.6, -0.6, 0.1, -0.1)
-    duration: Annotated[float, Field(gt=0, le=3600)] = 30.0
-    json_protocols: Annotated[tuple[ProtocolName, ...], Field(strict=False)] = (
-        "frequency_response",
-    )
+    starts: Annotated[tuple[Number, ...], Field(min_length=1, strict=False)] | None = None
+    duration: Annotated[float, Field(gt=0, le=3600)] | None = None
+    json_protocols: Annotated[tuple[ProtocolName, ...], Field(strict=False)] = ("frequency_response",)
     seed: Annotated[int, Field(ge=0)] = 1
 
     @model_validator(mode="after")
