@@ -62,7 +62,9 @@ def figure10(
     """Runs and onsets as comparison.json holds them, over the fitted and the symmetric robot's diagrams."""
     runs: Sequence[Run] = comparison["runs"]
     onsets: Sequence[Onset] = comparison.get("onset", ())
-    colours = _colours([entry["start"] for entry in (*runs, *onsets)])
+    known = [onset["start"] for onset in onsets]
+    groups = [start_label(_nearest(run["start"], known)) for run in runs]
+    colours = _colours([*groups, *map(start_label, known)])
     strip = 1.05 + ROW * len(onsets) if onsets else 0.0
     figure = new_figure(title, height=4.6 + strip, subtitle=subtitle, simulated=simulated)
     unit = units_of(axis).position
@@ -78,7 +80,7 @@ def figure10(
         for branch in fitted.branches:
             draw_branch(main, branch, cycle=INK, rest=INK)
     for number, (start, colour) in enumerate(colours.items()):
-        own = [run for run in runs if start_label(run["start"]) == start]
+        own = [run for run, group in zip(runs, groups, strict=True) if group == start]
         _draw_runs(main, own, colour, rank=number % len(_NESTED))
     main.set(xlabel="compensation gain $r$", ylabel=f"$x_1$ at rest, $\\max|x_1|$ of a cycle [{unit}]")
     reach = [float(run["r"]) for run in runs]
@@ -102,16 +104,17 @@ def _draw_symmetric(axes: Axes, diagram: DrawnDiagram) -> None:
 
 def _draw_runs(axes: Axes, runs: Sequence[Run], colour: str, *, rank: int) -> None:
     for run in runs:
-        verdict = run["verdict"]
-        height = _height(run.get("predicted") or {})
-        if height is not None:
-            axes.plot(
-                run["r"], height, marker="_", markersize=11, markeredgewidth=1.1, color=colour, zorder=3.6
-            )
+        r, verdict = run["r"], run["verdict"]
+        height = _height(run)
+        seen = 0.0 if height is None else height
+        predicted = _height(run.get("predicted") or {})
+        if predicted is not None:
+            axes.plot((r, r), (seen, predicted), color=colour, linewidth=0.7, alpha=0.6, zorder=3.5)
+            axes.plot(r, predicted, marker="_", markersize=11, markeredgewidth=1.1, color=colour, zorder=3.6)
         rests = verdict == "equilibrium"
         axes.plot(
-            run["r"],
-            _height(run) or 0.0,
+            r,
+            seen,
             marker=_MARK.get(verdict, "^"),
             markersize=_SIZE.get(verdict, 7.5) * (_NESTED_STARS if rests else _NESTED)[rank],
             markerfacecolor=colour if rests else "none",
@@ -131,18 +134,28 @@ def _height(outcome: Mapping[str, Any]) -> float | None:
     return next((float(outcome[name]) for name in names if outcome.get(name) is not None), None)
 
 
-def _colours(starts: Sequence[object]) -> dict[str, str]:
-    names = dict.fromkeys(map(start_label, starts))
-    return {name: _STARTS[k % len(_STARTS)] for k, name in enumerate(names)}
+def _nearest(start: object, known: Sequence[object]) -> object:
+    """The start of the onset that a run belongs to: measured starts scatter by some counts."""
+    numbers = [number for number in known if isinstance(number, int | float)]
+    if not isinstance(start, int | float) or not numbers:
+        return start
+    return min(numbers, key=lambda number: abs(number - start))
+
+
+def _colours(starts: Sequence[str]) -> dict[str, str]:
+    return {name: _STARTS[k % len(_STARTS)] for k, name in enumerate(dict.fromkeys(starts))}
 
 
 def _legend(
     runs: Sequence[Run], colours: Mapping[str, str], unit: str, *, fitted: bool, symmetric: bool
 ) -> list[Line2D | Patch]:
-    handles: list[Line2D | Patch] = [key("came to rest", marker="*"), key("cycles", marker="o", hollow=True)]
+    handles: list[Line2D | Patch] = [
+        key("came to rest", marker="*", size=9.0),
+        key("cycles", marker="o", hollow=True),
+    ]
     if any(run["verdict"] == "undecided" for run in runs):
         handles.append(key("undecided", marker="^", hollow=True))
-    handles.append(key("predicted", marker="_"))
+    handles.append(key("predicted", marker="_", size=9.0))
     handles += [
         Patch(facecolor=colour, label=no_math(f"from {start} {unit}")) for start, colour in colours.items()
     ]

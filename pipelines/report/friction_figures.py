@@ -26,6 +26,7 @@ from pipelines.report.style import BLUE, INK, VERMILLION, key, new_figure, style
 _COLOUR: Final = {1: BLUE, -1: VERMILLION}
 _NAME: Final = {1: "$\\dot{q} > 0$", -1: "$\\dot{q} < 0$"}
 _STRIBECK_RANGE: Final = 10.0  # Stribeck velocities that the right panel shows
+_WITHOUT_POINTS: Final = 2.5  # [rad/s], how far a model without measurements is drawn
 _WIDE: Final = 1.96  # standard errors to either side of a 95 % bar
 
 
@@ -59,7 +60,7 @@ def figure2(
 
 def _draw_whole(axes: Axes, points: Sequence[MapPoint], robot: OneLinkRobot | None) -> None:
     zero_lines(axes)
-    fastest = max((abs(point.velocity) for point in points), default=1.0)
+    fastest = max((abs(point.velocity) for point in points), default=_WITHOUT_POINTS)
     if robot is not None:
         speed = np.geomspace(1e-4, 1.0, 400) * fastest * 1.03
         for sign, curve in _curves(robot):
@@ -119,9 +120,14 @@ def _curves(robot: OneLinkRobot) -> tuple[tuple[int, StribeckCurve], tuple[int, 
 
 def _legend(points: Sequence[MapPoint], robot: OneLinkRobot | None) -> list[Line2D]:
     line = 1.6 if robot is not None else 0.0
-    handles = [key(_NAME[sign], marker="o", colour=_COLOUR[sign], line=line) for sign in (1, -1)]
-    handles.append(key("constant velocity, with 95 % bar", marker="o"))
-    handles.append(key("breakaway", marker="D"))
+    handles = [
+        key(_NAME[sign], marker="o" if points else "", colour=_COLOUR[sign], line=line) for sign in (1, -1)
+    ]
+    protocols = {point.protocol for point in points}
+    if "constant_velocity" in protocols:
+        handles.append(key("constant velocity, with 95 % bar", marker="o"))
+    if "breakaway" in protocols:
+        handles.append(key("breakaway", marker="D"))
     if any(not point.used for point in points):
         handles.append(key("left out", marker="o", hollow=True))
     return handles

@@ -101,7 +101,7 @@ def _numbers(onset: Onset) -> list[float]:
 def start_label(start: object) -> str:
     """A start's name: the position it was released from."""
     first = start[0] if isinstance(start, Sequence) and not isinstance(start, str) and start else start
-    return f"{first:+.3g}" if isinstance(first, int | float) else plain(str(first))
+    return f"{first:+.3g}".replace("-", "−") if isinstance(first, int | float) else plain(str(first))
 
 
 def _row_name(onset: Onset, unit: str, *, several: bool) -> str:

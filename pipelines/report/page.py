@@ -58,7 +58,7 @@ def report_page(
         entries=entries,
         truth=truth,
         robot=robot or {},
-        runs=_runs_first_left_out((robot or {}).get("runs") or ()),
+        runs=_every_log(robot or {}, comparison or {}),
         notes=_by_severity((robot or {}).get("notes") or ()),
         design=design,
         comparison=comparison,
@@ -152,9 +152,18 @@ def _by_severity(notes: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     return sorted(notes, key=lambda note: order.get(str(note.get("severity")), len(order)))
 
 
-def _runs_first_left_out(runs: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+def _every_log(robot: Mapping[str, Any], comparison: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The logs of the fit and of the comparison; those that were left out come first."""
+    logs: dict[str, Mapping[str, Any]] = {
+        run["log"]: {"protocol": "set_point", "used": True, "log": run["log"], "why": run.get("why")}
+        for run in comparison.get("runs") or ()
+    }
+    for use in comparison.get("excluded") or ():
+        logs[use["log"]] = {"protocol": "set_point", "used": False, **use}
+    for run in robot.get("runs") or ():
+        logs[run["log"]] = {**logs.get(run["log"], {}), **run}
     return sorted(
-        runs, key=lambda run: (bool(run.get("used")), str(run.get("protocol")), str(run.get("log")))
+        logs.values(), key=lambda run: (bool(run.get("used")), str(run.get("protocol")), str(run["log"]))
     )
 
 

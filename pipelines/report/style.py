@@ -164,10 +164,18 @@ def zero_lines(axes: Axes, *, vertical: bool = False) -> None:
         axes.axvline(0.0, color=MUTED, linewidth=0.7, zorder=0.9)
 
 
-def key(label: str, *, marker: str, colour: str = INK, hollow: bool = False, line: float = 0.0) -> Line2D:
-    """A legend's entry: a mark, hollow or filled, on a line of the given width or on none."""
+def key(
+    label: str,
+    *,
+    marker: str,
+    colour: str = INK,
+    hollow: bool = False,
+    line: float = 0.0,
+    size: float = 5.5,
+) -> Line2D:
+    """A legend's entry: a mark, hollow or filled, on a line of the given width or on none; [pt]."""
     return Line2D(
-        [], [], marker=marker, color=colour, markerfacecolor="none" if hollow else colour, markersize=5.5,
+        [], [], marker=marker, color=colour, markerfacecolor="none" if hollow else colour, markersize=size,
         linewidth=line, linestyle="-" if line else "none", label=label,
     )  # fmt: skip
 

@@ -159,10 +159,19 @@ class TestFigure10:
 
     def test_onsets_have_a_row_for_each_start(self) -> None:
         strip = figure10(examples.comparison()).axes[1]
-        assert [tick.get_text() for tick in strip.get_yticklabels()] == ["from +0.6 rad", "from -0.1 rad"]
+        assert [tick.get_text() for tick in strip.get_yticklabels()] == ["from +0.6 rad", "from −0.1 rad"]
         predicted = [float(np.ravel(m.get_xdata())[0]) for m in _marks(strip, "D")]
         assert sorted(predicted) == [0.993, 0.995]
         assert [float(np.ravel(m.get_xdata())[0]) for m in _marks(strip, "*")] == [1.15]
+
+    def test_a_run_has_the_colour_of_the_start_that_it_belongs_to(self) -> None:
+        comparison = examples.comparison()
+        for k, run in enumerate(comparison["runs"]):
+            run["start"] += 1e-3 * k  # as measured
+        main, strip = figure10(comparison).axes
+        colours = {str(mark.get_markerfacecolor()) for mark in _marks(main, "*")}
+        assert len(colours) == 2
+        assert {str(mark.get_color()) for mark in _marks(strip, "|")} == colours
 
     def test_no_runs_or_no_onsets_are_no_failure(self) -> None:
         assert len(figure10({"runs": [], "onset": []}).axes) == 1
