@@ -246,8 +246,8 @@ def _require_unit(quantity: Quantity, signal: Signal, declared: str | None, *, a
     source = "the campaign says" if signal.unit else "the campaign names no unit, which means"
     raise LogError(
         f"E-UNIT refuse: the log declares {quantity} in {declared!r}, but {source} {stated!r}; every "
-        f'parameter drawn from it would be wrong by their ratio. If the log is right, set unit = "{declared}" '
-        f"on {quantity}"
+        f"parameter drawn from it would be wrong by their ratio. If the log is right, set "
+        f'unit = "{declared}" on {quantity}'
     )
 
 

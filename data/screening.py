@@ -312,8 +312,8 @@ def require_torque_sign(run: Signals, resolution: float | None) -> None:
         return
     raise LogError(
         f"{run.log}: E-SIGN refuse: the torque opposes the motion (its work over the run is negative, "
-        f"{100 * share:.0f} % of its size), as if friction drove the link; every friction torque would change "
-        "sign. Set `sign = -1` on torque or position in [signals]"
+        f"{100 * share:.0f} % of its size), as if friction drove the link; every friction torque would "
+        "change sign. Set `sign = -1` on torque or position in [signals]"
     )
 
 
