@@ -49,6 +49,13 @@ def chosen_loop(defaults: LoopDefaults, options: GainOptions) -> LoopDefaults:
     return replace(defaults, **spoken)
 
 
+def with_exact(defaults: LoopDefaults, options: GainOptions) -> LoopDefaults:
+    """The defaults with r = 1 where nothing says r: for questions that exact compensation answers."""
+    if defaults.compensation is None and options.compensation is None:
+        return replace(defaults, compensation=1.0)
+    return defaults
+
+
 def chosen_gains(defaults: LoopDefaults, options: GainOptions, *, source: str) -> Gains:
     """All four gains; raises `UsageError` naming every option that is missing.
 

@@ -1,10 +1,10 @@
 """manifest.json: where the files of a result folder come from.
 
 Schema `stribeck/manifest/1`: `campaign` and `rig` say whose folder it is; `simulated` whether the logs came
-from a virtual rig; `versions` of this program and of what it computes with; `commands`, an entry for each that wrote
-here, with its options, seed and exit status; `inputs` (campaign.toml, logs, robot.json) and `outputs` (with the
-command that wrote them), each with its SHA-256. Inputs are named as the campaign names them, and nothing
-depends on the machine, its folders or the time: the same inputs give the same manifest.
+from a virtual rig; `versions` of this program and of what it computes with; `commands`, an entry for each
+that wrote here, with its options, seed and exit status; `inputs` (campaign.toml, logs, robot.json) and
+`outputs` (with the command that wrote them), each with its SHA-256. Inputs are named as the campaign names
+them, and nothing depends on the machine, its folders or the time: the same inputs give the same manifest.
 """
 
 from __future__ import annotations

@@ -18,6 +18,19 @@ class Progress(Protocol):
         """Begin a stage of `total` steps; the returned function is told of each that is done."""
 
 
+def told(progress: Progress, name: str) -> Callable[[str, int, int], None]:
+    """A stage for work that says itself what is next, how much is done, and of how much."""
+    ticks: list[Tick] = []
+
+    def tell(_what: str, done: int, total: int) -> None:
+        if not ticks:
+            ticks.append(progress.stage(name, total))
+        if done:
+            ticks[0](1)
+
+    return tell
+
+
 class Silent:
     """Shows nothing."""
 

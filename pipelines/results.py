@@ -57,7 +57,7 @@ class ResultFolder:
         """Write one result file, whole or not at all."""
         target = self.path / name
         if not (self.path / MANIFEST).exists():
-            self._claim()
+            self.claim()
         target.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(target, content)
         self.written[name] = hashlib.sha256(content).hexdigest()
@@ -71,7 +71,7 @@ class ResultFolder:
         """Write a comma-separated table: a header, then rows; an absent value is an empty cell."""
         return self.write_text(name, csv_text(header, rows))
 
-    def _claim(self) -> None:
+    def claim(self) -> None:
         """Say whose folder this is before anything lies in it: an interrupted command can be rerun."""
         self.path.mkdir(parents=True, exist_ok=True)
         claim = json_text(MANIFEST_SCHEMA, {"campaign": self.owner.campaign, "rig": self.owner.rig})

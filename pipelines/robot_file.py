@@ -61,6 +61,7 @@ class RobotFile:
     fitted: OneLinkRobot | None  # None: a parameter that it needs is withheld
     identified: IdentifiedRobot | None  # None for the paper, which has no uncertainty
     loop: LoopDefaults
+    path: Path | None = None  # None for the paper
 
     @property
     def published(self) -> bool:
@@ -130,7 +131,9 @@ def read_robot(source: str | Path) -> RobotFile:
         raise RobotFileError(f"{path}: {broken}") from None
     name = path.stem if campaign is None else campaign.name
     rig = "" if campaign is None else campaign.rig
-    return RobotFile(name=str(path), owner=Owner(name, rig), fitted=fitted, identified=identified, loop=loop)
+    return RobotFile(
+        name=path.name, owner=Owner(name, rig), fitted=fitted, identified=identified, loop=loop, path=path
+    )
 
 
 def write_robot(folder: ResultFolder, robot: IdentifiedRobot, loop: LoopDefaults) -> Path:

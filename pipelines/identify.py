@@ -1,0 +1,66 @@
+"""identify: logs into the fitted robot, with everything that shows how it came about.
+
+Writes `robot.json` (`pipelines.robot_file`), `friction_map.csv` (a row a point or a run left out, columns as
+the fields of `ident.friction_map.MapPoint`), `fit_report.txt`, Table 1 as `.csv`, `.md` and `.tex`, and
+`figure2.svg`.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import astuple, fields, replace
+
+from data.recording import Axis
+from ident.estimate import IdentifiedRobot
+from ident.friction_map import MapPoint
+from ident.identification import Identification
+from ident.identification import identify as fit
+from pipelines.loop_settings import LoopDefaults
+from pipelines.recordings import ReadLogs
+from pipelines.results import ResultFolder
+from pipelines.robot_file import write_robot
+
+
+def identify(logs: ReadLogs, *, free_beta: bool = False) -> Identification:
+    """The robot behind the recordings; runs that the campaign excludes are listed with their reason.
+
+    Raises `LogError` where the recordings can give no robot at all.
+    """
+    found = fit(logs.recordings, free_beta=free_beta)
+    runs = tuple(sorted((*found.robot.runs, *logs.excluded), key=lambda use: use.log))
+    return replace(found, robot=replace(found.robot, runs=runs))
+
+
+def write_identification(
+    found: Identification,
+    folder: ResultFolder,
+    *,
+    loop: LoopDefaults,
+    axis: Axis,
+    truth: Mapping[str, object] | None = None,
+) -> None:
+    """All files of `identify`; `truth` is what truth.json of a virtual rig holds."""
+    from pipelines.report.friction_figures import figure2  # noqa: PLC0415  (matplotlib)
+    from pipelines.report.style import svg_text  # noqa: PLC0415
+    from pipelines.report.tables import table1_csv, table1_markdown, table1_tex  # noqa: PLC0415
+
+    robot = found.robot
+    path = write_robot(folder, robot, loop)
+    document = json.loads(path.read_text(encoding="utf-8"))
+    folder.write_csv(
+        "friction_map.csv",
+        [field.name for field in fields(MapPoint)],
+        [astuple(point) for point in found.friction_map],
+    )
+    folder.write_text("fit_report.txt", found.fit_report.rstrip() + "\n")
+    folder.write_text("table1.csv", table1_csv(document, truth=truth))
+    folder.write_text("table1.md", table1_markdown(document, truth=truth))
+    folder.write_text("table1.tex", table1_tex(document, truth=truth))
+    figure = figure2(found.friction_map, robot.robot(), axis=axis, simulated=robot.simulated)
+    folder.write_text("figure2.svg", svg_text(figure))
+
+
+def left_out(robot: IdentifiedRobot, excluded: frozenset[str]) -> list[str]:
+    """The logs that the identification left out, with the reason; not those that the campaign excludes."""
+    return [f"{use.log}: {use.why}" for use in robot.runs if not use.used and use.log not in excluded]

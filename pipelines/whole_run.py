@@ -1,0 +1,274 @@
+"""The chain behind `run` and `demo`: identify, design, predict, compare, report, manifest.
+
+Part of the command line, which alone knows all questions: it hands result files and values from one to the
+next. All logs are read before anything is written. Where a parameter is withheld, or the campaign lacks what
+a question needs, that question says why and the others go on; the run then ends with status 3.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from compensation.controller import Gains
+from data.findings import Severity
+from data.recording import Recording
+from ident.estimate import IdentifiedRobot
+from pipelines.campaign import Campaign
+from pipelines.compare import compare, write_comparison, write_figure10
+from pipelines.design import design, write_design
+from pipelines.executors.processes import opened_map
+from pipelines.executors.threads import opened_threads
+from pipelines.exit_status import Status, UsageError
+from pipelines.gains import GainOptions, chosen_gains, chosen_sampling, with_exact
+from pipelines.identify import identify, left_out, write_identification
+from pipelines.loop_settings import LawChoice
+from pipelines.manifest import Command, write_manifest
+from pipelines.motion_figures import write_motion_figures
+from pipelines.predict import Sweep, one_sweep
+from pipelines.progress import Progress
+from pipelines.recordings import IDENTIFYING, ReadLogs, SetPointLogs, SetPointRun, read_logs, set_point_logs
+from pipelines.report.page import report_page
+from pipelines.results import ResultFolder
+from pipelines.robot_file import RobotFile, read_robot, withheld_parameters
+from pipelines.robot_questions import axis_of, predict_robot
+from pipelines.run_outcomes import sampled_outcomes
+
+PICTURES = ("figure2", "figure4", "figure6", "figure7", "figure8", "figure9", "figure10")
+SWEEP_POINTS = 101
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """What the command line said of a run."""
+
+    free_beta: bool = False
+    salvage: bool = False
+    law: LawChoice = "per-direction"
+    compensator: LawChoice | None = None
+    gains: GainOptions = field(default_factory=GainOptions)
+    over: tuple[str, ...] = ()
+    seed: int = 0
+    jobs: int | None = None
+
+    def shown(self) -> dict[str, object]:
+        """As the manifest remembers them; they hold no path."""
+        said = {f"{name}_gain": getattr(self.gains, name) for name in ("compensation", "observer")}
+        said |= {name: getattr(self.gains, name) for name in ("proportional", "derivative", "sample_period")}
+        return {
+            "free_beta": self.free_beta,
+            "salvage": self.salvage,
+            "law": self.law,
+            "compensator": self.compensator,
+            "over": list(self.over),
+            **{name: value for name, value in said.items() if value is not None},
+        }
+
+
+def identify_campaign(
+    campaign: Campaign, folder: ResultFolder, options: RunOptions, *, progress: Progress
+) -> list[str]:
+    """`identify` alone; returns what was withheld or left out, in sentences."""
+    with opened_map(options.jobs or 1) as spread:
+        logs = read_logs(campaign, IDENTIFYING, salvage=options.salvage, map=spread, progress=progress)
+    missing, robot = _identified(campaign, logs, folder, options, progress)
+    _conclude(folder, campaign, options, "identify", missing, inputs_of(logs), simulated=robot.simulated)
+    return missing
+
+
+def compare_campaign(
+    campaign: Campaign, source: RobotFile, folder: ResultFolder, options: RunOptions, *, progress: Progress
+) -> list[str]:
+    """`compare` alone; returns what was withheld or left out, in sentences."""
+    with opened_map(options.jobs or 1) as spread:
+        logs = set_point_logs(campaign, salvage=options.salvage, map=spread, progress=progress)
+    if not logs.runs:
+        raise UsageError(f"{campaign.path}: no set-point runs to compare: add a [[experiment]] with them")
+    missing = _answer_for_runs(campaign, source, logs, folder, options, progress)
+    simulated = any(run.recording.simulated for run in logs.runs)
+    _conclude(folder, campaign, options, "compare", missing, inputs_of(logs), simulated=simulated)
+    return missing
+
+
+def run_campaign(
+    campaign: Campaign, folder: ResultFolder, options: RunOptions, *, command: str, progress: Progress
+) -> list[str]:
+    """All of `run`, from robot.json to manifest.json; returns what was withheld or left out, in sentences."""
+    with opened_map(options.jobs or 1) as spread:
+        logs = read_logs(campaign, IDENTIFYING, salvage=options.salvage, map=spread, progress=progress)
+        set_point = set_point_logs(campaign, salvage=options.salvage, map=spread, progress=progress)
+    missing, robot = _identified(campaign, logs, folder, options, progress)
+    source = read_robot(folder.path / "robot.json")
+    loop = with_exact(source.loop, options.gains)
+    try:
+        gains = chosen_gains(loop, options.gains, source=source.name)
+    except UsageError as failure:
+        missing.append(f"design and predict are left out: {failure}")
+    else:
+        missing += _answer_for_robot(source, gains, folder, options, set_point.runs, progress)
+    missing += _answer_for_runs(campaign, source, set_point, folder, options, progress)
+    write_report(folder, campaign, truth=read_truth(campaign), simulated=robot.simulated)
+    inputs = {**inputs_of(logs), **inputs_of(set_point)}
+    _conclude(folder, campaign, options, command, missing, inputs, simulated=robot.simulated)
+    return missing
+
+
+def _identified(
+    campaign: Campaign, logs: ReadLogs, folder: ResultFolder, options: RunOptions, progress: Progress
+) -> tuple[list[str], IdentifiedRobot]:
+    tick = progress.stage("identifying", 1)
+    found = identify(logs, free_beta=options.free_beta)
+    tick(1)
+    write_identification(
+        found, folder, loop=campaign.loop_defaults(), axis=campaign.rig.axis, truth=read_truth(campaign)
+    )
+    missing = withheld_parameters(found.robot)
+    missing += left_out(found.robot, frozenset(use.log for use in logs.excluded))
+    return missing + salvaged(logs.recordings), found.robot
+
+
+def _conclude(
+    folder: ResultFolder,
+    campaign: Campaign,
+    options: RunOptions,
+    command: str,
+    missing: list[str],
+    inputs: dict[str, str],
+    *,
+    simulated: bool,
+) -> None:
+    """Enter the command in the folder's manifest."""
+    status = Status.WITHHELD if missing else Status.DONE
+    named = {campaign.path.name: campaign.sha256, **inputs}
+    entry = Command(command, options.shown(), options.seed, int(status), named, simulated)
+    write_manifest(folder, entry)
+
+
+def inputs_of(logs: ReadLogs | SetPointLogs) -> dict[str, str]:
+    """The SHA-256 of each log, excluded ones included."""
+    recordings = logs.recordings if isinstance(logs, ReadLogs) else [run.recording for run in logs.runs]
+    used = {recording.log: recording.sha256 for recording in recordings}
+    return used | {use.log: use.sha256 for use in logs.excluded}
+
+
+def _answer_for_robot(
+    source: RobotFile,
+    gains: Gains,
+    folder: ResultFolder,
+    options: RunOptions,
+    runs: tuple[SetPointRun, ...],
+    progress: Progress,
+) -> list[str]:
+    """design and predict; what they lack, in sentences."""
+    tick = progress.stage("designing", 1)
+    write_design(
+        design(source, gains, law=options.law, compensator=options.compensator, seed=options.seed), folder
+    )
+    tick(1)
+    if source.fitted is None:
+        return ["predict is left out: a parameter is withheld"]
+    predict_robot(
+        source,
+        options.gains,
+        swept(options, runs),
+        folder,
+        law=options.law,
+        compensator=options.compensator,
+        sampling=chosen_sampling(source.loop, options.gains),
+        jobs=options.jobs,
+        progress=progress,
+    )
+    farthest = max((abs(float(run.recording.position[0])) for run in runs), default=1.0) or 1.0
+    why = write_motion_figures(
+        folder, source.fitted, gains, start=farthest, axis=axis_of(source), simulated=source.simulated
+    )
+    return [] if why is None else [why]
+
+
+def _answer_for_runs(
+    campaign: Campaign,
+    source: RobotFile,
+    logs: SetPointLogs,
+    folder: ResultFolder,
+    options: RunOptions,
+    progress: Progress,
+) -> list[str]:
+    """compare; what it lacks, in sentences."""
+    if not logs.runs:
+        return [f"compare is left out: {campaign.path.name} has no set-point runs"]
+    with opened_threads(options.jobs) as spread:
+        found = compare(
+            logs.runs,
+            source,
+            sampled=partial(sampled_outcomes, map=spread),
+            law=options.law,
+            compensator=options.compensator,
+            excluded=logs.excluded,
+            seed=options.seed,
+            progress=progress,
+        )
+    write_comparison(folder, found)
+    write_figure10(folder, found, axis=campaign.rig.axis)
+    return [*found.withheld, *salvaged(run.recording for run in logs.runs)]
+
+
+def swept(options: RunOptions, runs: tuple[SetPointRun, ...]) -> Sweep:
+    """The sweep that was asked for, else r over that of the recorded runs, else the usual one."""
+    recorded = [run.set_point.compensation_gain for run in runs]
+    if options.over or len(set(recorded)) < 2:
+        return one_sweep(options.over)
+    return Sweep("r", np.linspace(min(recorded), max(recorded), SWEEP_POINTS))
+
+
+def salvaged(recordings: Iterable[Recording]) -> list[str]:
+    """What screening or salvage took out of the recordings, in sentences."""
+    return [
+        f"{recording.log}: {finding.code}: {finding.text}"
+        for recording in recordings
+        for finding in recording.findings
+        if finding.severity is not Severity.WARN
+    ]
+
+
+def read_truth(campaign: Campaign) -> dict[str, object] | None:
+    """truth.json of a virtual rig, beside its campaign."""
+    path = campaign.folder / "truth.json"
+    if campaign.virtual_rig is None or not path.is_file():
+        return None
+    truth = json.loads(path.read_text(encoding="utf-8"))
+    return truth if isinstance(truth, dict) else None
+
+
+def write_report(
+    folder: ResultFolder, campaign: Campaign, *, truth: dict[str, object] | None, simulated: bool
+) -> None:
+    """report.html from the files that this run has written."""
+
+    def document(name: str) -> dict[str, Any] | None:
+        if name not in folder.written:
+            return None
+        return dict(json.loads((folder.path / name).read_text(encoding="utf-8")))
+
+    pictures = {
+        name: (folder.path / f"{name}.svg").read_text(encoding="utf-8")
+        for name in PICTURES
+        if f"{name}.svg" in folder.written
+    }
+    page = report_page(
+        name=campaign.name,
+        rig=campaign.rig.name,
+        robot=document("robot.json"),
+        design=document("design.json"),
+        comparison=document("comparison.json"),
+        truth=truth,
+        fit_report=(folder.path / "fit_report.txt").read_text(encoding="utf-8"),
+        figures=pictures,
+        axis=campaign.rig.axis,
+        simulated=simulated,
+    )
+    folder.write_text("report.html", page)
