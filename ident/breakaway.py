@@ -1,0 +1,233 @@
+r"""Breakaway: the torque at which a link at rest begins to move, eq (4)'s F_s.
+
+A threshold on speed or on travel finds the instant late, and by then the ramp has risen: the torque read
+there is biased upwards. So the detection is made part of the model instead. From sustained motion one goes
+back to the instant t_x at which the link has left its place of rest by x, a few counts; the torque u(t_x)
+is read off a line through the ramp. Under a pure set-valued law the link starts exactly at F_s, and from
+there needs the time d(u', x) to travel x under a ramp of u' [N m/s] (`ident.response.breakaway_delay`):
+
+    u(t_x) = F_s + u' d(u', x).
+
+That is the residual of the joint fit; for small v/v_s the delay is tau ln(...) with tau = J / (dF/v_s - b).
+
+A motion is sustained if it covers 20 counts. Less, from one rest to the next, is pre-sliding or creep
+(E-CREEP). A start without a ramp (a step of torque, the end of a move) is no breakaway experiment. A start
+at the torque limit, or none at all there, is censored: it says F_s >= limit and gives no number (E-SAT).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from data.recording import FloatArray, Recording
+from ident.segmentation import Stretch, grain, slow_spans, stretches
+
+SUSTAINED_COUNTS = 20.0
+ONSET_COUNTS = 3.5  # the first reading beyond is the onset
+LEAST_SAMPLES = 12  # of a ramp
+STRAIGHT = 0.001  # part of the torque by which a ramp may bend off its line
+AT_LIMIT = 0.99  # part of the torque limit
+
+
+@dataclass(frozen=True)
+class RampLine:
+    """The torque of a ramp as a line in time, up to its end."""
+
+    torque: float  # at the end [N m]
+    stderr: float  # of it [N m]
+    rate: float  # [N m/s]
+    start_time: float  # [s]
+
+
+@dataclass(frozen=True)
+class Breakaway:
+    """One start from rest. Signs are those of the log."""
+
+    log: str
+    direction: int  # +1 or -1
+    line: RampLine  # its torque is that of t_x
+    travel: float  # x [rad], > 0
+    travel_stderr: float  # [rad]
+    place: float  # position of rest [rad]
+    onset_time: float  # t_x [s]
+    onset: int  # first sample at or after t_x
+    end: int  # past the last sample of the motion that follows
+    end_time: float  # [s]
+    why: str | None = None  # why it is left out, beginning with its code
+
+    @property
+    def torque(self) -> float:
+        """u(t_x), signed [N m]."""
+        return self.line.torque
+
+    @property
+    def is_censored(self) -> bool:
+        """Whether it only says that F_s is at least this torque."""
+        return self.why is not None and self.why.startswith("E-SAT")
+
+
+def breakaways(recording: Recording) -> tuple[Breakaway, ...]:
+    """Every start from rest in a log, those that are no breakaway included, in order of time."""
+    still = slow_spans(recording, stretches(recording))
+    found = []
+    for number, rest in enumerate(still):
+        after = still[number + 1].first if number + 1 < len(still) else recording.time.size
+        start = _start(recording, rest, after)
+        if start is not None:
+            found.append(start)
+    return tuple(found)
+
+
+def _start(recording: Recording, rest: Stretch, after: int) -> Breakaway | None:
+    """The start from one rest; None where the link only settles."""
+    resolution = grain(recording)
+    late = recording.position[rest.last - max(1, (rest.last - rest.first) * 3 // 10) : rest.last]
+    place = float(np.median(late))
+    away = recording.position[rest.first : max(after, rest.last)] - place
+    far = np.flatnonzero(np.abs(away[late.size :]) >= SUSTAINED_COUNTS * resolution)
+    if far.size == 0:
+        return _no_start(recording, rest, place, float(np.max(np.abs(away))) / resolution)
+    sustained = int(far[0]) + late.size
+    direction = 1 if away[sustained] > 0 else -1
+    scatter = 3.0 * 1.4826 * float(np.median(np.abs(late - place)))
+    least = (ONSET_COUNTS + np.ceil(scatter / resolution)) * resolution
+    before = int(np.flatnonzero(direction * away[: sustained + 1] < least)[-1])
+    onset = rest.first + before + 1
+    end = _end_of_motion(recording, rest.first + sustained, after, direction)
+    start = Breakaway(
+        log=recording.log,
+        direction=direction,
+        line=_ramp_line(recording, rest.first, onset),
+        travel=_travel_at(recording, onset, direction * float(away[before + 1])),
+        travel_stderr=0.4 * resolution,  # two roundings
+        place=place,
+        onset_time=float(recording.time[onset]),
+        onset=onset,
+        end=end,
+        end_time=float(recording.time[end - 1]),
+    )
+    # The torque is held: it follows the line through its samples half a sample late.
+    later = start.onset_time - 0.5 * recording.sample_period - recording.time[onset - 1]
+    line = replace(start.line, torque=float(start.line.torque + start.line.rate * later))
+    return replace(start, line=line, why=_objection(recording, start))
+
+
+def _objection(recording: Recording, start: Breakaway) -> str | None:
+    """Why a start is no breakaway experiment; None if it is one."""
+    line = start.line
+    if recording.torque_limit is not None and abs(line.torque) >= AT_LIMIT * recording.torque_limit:
+        return (
+            f"E-SAT: the torque is at its limit when the link moves: F_s >= {abs(line.torque):.4g}, not a "
+            "number. "
+            "Raise the limit or reduce the friction."
+        )
+    if not np.isfinite(line.stderr) or line.rate * start.direction <= 0:
+        return (
+            "no ramp: the torque does not rise along a line before the link moves at "
+            f"{start.onset_time:.3g} s, "
+            "so its value there is not F_s. Ramp it slowly from rest."
+        )
+    return None
+
+
+def _no_start(recording: Recording, rest: Stretch, place: float, counts: float) -> Breakaway | None:
+    """A rest that ends in no sustained motion: creep under a ramp, a torque at its limit, or nothing."""
+    last = min(rest.last, recording.time.size) - 1
+    smooth = recording.torque[max(rest.first, last - LEAST_SAMPLES) : last + 1]
+    line = RampLine(float(np.mean(smooth)), float("nan"), 0.0, float(recording.time[rest.first]))
+    limit = recording.torque_limit
+    peak = float(np.max(np.abs(recording.torque[rest.first : last + 1])))
+    if limit is not None and peak >= AT_LIMIT * limit:
+        side = recording.torque[rest.first + int(np.argmax(np.abs(recording.torque[rest.first : last + 1])))]
+        line = replace(line, torque=float(np.sign(side)) * limit)
+        why = f"E-SAT: the link rests at the torque limit: F_s >= {limit:.4g}, not a number. Raise the limit."
+    elif counts >= ONSET_COUNTS and np.isfinite(_ramp_line(recording, rest.first, last + 1).stderr):
+        why = (
+            f"E-CREEP: {counts:.0f} counts of travel and no sustained motion: pre-sliding, not a breakaway. "
+            "Ramp on until the link runs."
+        )
+    else:
+        return None
+    return Breakaway(
+        log=recording.log,
+        direction=1 if line.torque > 0 else -1,
+        line=line,
+        travel=0.0,
+        travel_stderr=0.0,
+        place=place,
+        onset_time=float(recording.time[last]),
+        onset=last,
+        end=last + 1,
+        end_time=float(recording.time[last]),
+        why=why,
+    )
+
+
+def _travel_at(recording: Recording, onset: int, reading: float) -> float:
+    """Displacement at the onset's sample [rad], from its reading.
+
+    A reading of k counts that has only just come about means k - 1/2; in a motion of several counts a sample
+    the true position lies anywhere in its count, and k is the best guess.
+    """
+    resolution = grain(recording)
+    last = min(onset + 1, recording.time.size - 1)
+    first = max(onset - 1, 0)
+    counts = abs(recording.position[last] - recording.position[first]) / resolution / max(last - first, 1)
+    return float(reading - 0.5 * resolution * (1.0 - min(counts, 1.0)))
+
+
+def _end_of_motion(recording: Recording, sustained: int, after: int, direction: int) -> int:
+    """Index past the last sample before the link turns back, or rests."""
+    moved = direction * recording.position[sustained:after]
+    if moved.size == 0:
+        return sustained + 1
+    highest = np.maximum.accumulate(moved)
+    back = np.flatnonzero(moved < highest - 2.0 * grain(recording))
+    return sustained + (int(back[0]) if back.size else moved.size)
+
+
+def _ramp_line(recording: Recording, first: int, onset: int) -> RampLine:
+    """Line through the longest part of the ramp before a sample that is straight; its value there.
+
+    The torque is the line's at sample onset - 1; an unknown stderr (nan) says that there is no ramp.
+    """
+    time, torque = recording.time[first:onset], recording.torque[first:onset]
+    none = RampLine(
+        float(torque[-1]) if torque.size else 0.0, float("nan"), 0.0, float(recording.time[first])
+    )
+    noise = (
+        float(np.sqrt(np.mean(np.diff(torque[-torque.size // 2 :]) ** 2) / 2.0)) if torque.size > 4 else 0.0
+    )
+    best = none
+    size = LEAST_SAMPLES
+    while size <= torque.size:
+        line, misfit = _line(time[-size:], torque[-size:], noise)
+        if best is none or misfit <= 1.0:
+            rise = abs(line.rate) * (time[-1] - time[-size])
+            best = line if rise > 5.0 * line.stderr + STRAIGHT * abs(line.torque) else best
+        elif misfit > 3.0:
+            break
+        size = size + max(1, size // 4)
+    return best
+
+
+def _line(time: FloatArray, torque: FloatArray, noise: float) -> tuple[RampLine, float]:
+    """Least-squares line, and its lack of straightness: 1 where block means just stray as far as allowed."""
+    centred = time - time[-1]
+    basis = np.column_stack([np.ones_like(centred), centred])
+    coefficient, *_ = np.linalg.lstsq(basis, torque, rcond=None)
+    residual = torque - basis @ coefficient
+    blocks = np.array([piece.mean() for piece in np.array_split(residual, 6)])
+    allowed = 4.0 * noise * np.sqrt(6.0 / time.size) + STRAIGHT * abs(float(coefficient[0]))
+    misfit = float(np.max(np.abs(blocks))) / max(allowed, float(np.finfo(np.float64).tiny))
+    scatter = max(noise, float(np.std(residual)))
+    at_end = np.linalg.inv(basis.T @ basis)[0, 0]
+    line = RampLine(
+        torque=float(coefficient[0]),
+        stderr=float(scatter * np.sqrt(at_end)),
+        rate=float(coefficient[1]),
+        start_time=float(time[0]),
+    )
+    return line, misfit

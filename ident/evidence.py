@@ -1,0 +1,148 @@
+"""What the recordings of a campaign hold, before any law is fitted to it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from data.findings import Finding, LogError, Severity
+from data.protocols import IDENTIFIES, ProtocolName
+from data.recording import Recording
+from ident.breakaway import Breakaway, breakaways
+from ident.estimate import RunUse
+from ident.frequency_response import FrequencyInertia, frequency_inertia
+from ident.friction_map import SteadyRun, steady_runs
+from ident.momentum import Momentum, momentum
+
+
+class IdentificationError(LogError):
+    """Recordings from which no friction law can be had; the message says what to record."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Everything that was found, used or not."""
+
+    runs: tuple[SteadyRun, ...]
+    starts: tuple[Breakaway, ...]
+    momenta: tuple[Momentum, ...]
+    response: FrequencyInertia | None
+    response_reasons: dict[str, str]  # log -> why it gave no inertia
+
+    @property
+    def used_runs(self) -> tuple[SteadyRun, ...]:
+        """Steady runs that the fit takes."""
+        return tuple(run for run in self.runs if run.why is None)
+
+    @property
+    def used_starts(self) -> tuple[Breakaway, ...]:
+        """Breakaways that the fit takes."""
+        return tuple(start for start in self.starts if start.why is None)
+
+
+def gather(recordings: Sequence[Recording]) -> Evidence:
+    """Segment every log by its protocol."""
+    runs: list[SteadyRun] = []
+    starts: list[Breakaway] = []
+    momenta: list[Momentum] = []
+    for recording in recordings:
+        if recording.protocol == "constant_velocity":
+            runs += steady_runs(recording)
+        elif recording.protocol == "breakaway":
+            own = breakaways(recording)
+            starts += own
+            motions = (momentum(recording, start) for start in own if start.why is None)
+            momenta += [motion for motion in motions if motion is not None]
+    response, reasons = frequency_inertia(_of(recordings, "frequency_response"))
+    return Evidence(tuple(runs), tuple(starts), tuple(momenta), response, reasons)
+
+
+def require_evidence(recordings: Sequence[Recording], evidence: Evidence) -> None:
+    """Raise `IdentificationError` where a direction is missing or the torque's sign is wrong."""
+    _require_directions(recordings, evidence)
+    _require_sign(evidence)
+
+
+def run_uses(recordings: Sequence[Recording], evidence: Evidence) -> tuple[RunUse, ...]:
+    """Every log once: whether it was used, and if not, why."""
+    used = {run.log for run in evidence.used_runs} | {start.log for start in evidence.used_starts}
+    reasons: dict[str, list[str]] = {}
+    for log, why, _ in _left_out(evidence):
+        reasons.setdefault(log, []).append(why)
+    if evidence.response is not None:
+        used |= {fit.log for fit in evidence.response.fits}
+    uses = []
+    for recording in recordings:
+        log = recording.log
+        if log in used:
+            uses.append(RunUse(log, recording.sha256, recording.protocol, used=True))
+            continue
+        if recording.protocol == "set_point":
+            why = "a set-point run: the prediction is held against it, nothing is fitted to it"
+        elif recording.protocol == "excitation":
+            why = "an excitation run: the friction map does not use it"
+        else:
+            nothing = "no start from rest under a ramp was found"
+            why = evidence.response_reasons.get(log) or "; ".join(reasons.get(log, [nothing]))
+        uses.append(RunUse(log, recording.sha256, recording.protocol, used=False, why=why))
+    return tuple(uses)
+
+
+def run_findings(evidence: Evidence) -> tuple[Finding, ...]:
+    """A finding for each run or start that is left out under a code."""
+    found = []
+    for log, why, where in _left_out(evidence):
+        code, colon, text = why.partition(": ")
+        if not colon or not code.startswith("E-"):
+            continue
+        severity = Severity.WARN if code in {"E-CREEP", "E-SAT"} else Severity.WITHHOLD
+        found.append(Finding(code, severity, f"{log}, {where:.3g} s: {text}", log))
+    return tuple(found)
+
+
+def _left_out(evidence: Evidence) -> list[tuple[str, str, float]]:
+    """Log, reason and instant [s] of each run and each start that is left out."""
+    runs = [(run.log, run.why, run.start_time) for run in evidence.runs if run.why is not None]
+    starts = [(start.log, start.why, start.onset_time) for start in evidence.starts if start.why is not None]
+    return runs + starts
+
+
+def _of(recordings: Iterable[Recording], protocol: ProtocolName) -> list[Recording]:
+    return [recording for recording in recordings if recording.protocol == protocol]
+
+
+def _require_directions(recordings: Sequence[Recording], evidence: Evidence) -> None:
+    for sign, name in ((1, "positive"), (-1, "negative")):
+        if any(run.direction == sign for run in evidence.used_runs):
+            continue
+        seen = sorted({recording.protocol for recording in recordings})
+        logs = sum(recording.protocol == "constant_velocity" for recording in recordings)
+        left_out = [run for run in evidence.runs if run.why is not None and run.velocity * sign > 0]
+        also = (
+            f" {len(left_out)} run(s) that way were left out; the first: {left_out[0].why}"
+            if left_out
+            else ""
+        )
+        raise IdentificationError(
+            f"E-DIRECTION: no usable constant-velocity run with {name} velocity ({logs} constant_velocity "
+            "log(s); "
+            f"protocols seen: {', '.join(seen) or 'none'}).{also} F_c, v_s and b of that direction cannot be "
+            f"told, and the other direction's law is never copied. Record constant speeds with {name} "
+            "velocity, "
+            f"in ratio from slow to fast; they give {IDENTIFIES['constant_velocity']}."
+        )
+
+
+def _require_sign(evidence: Evidence) -> None:
+    against = []
+    for sign in (1, -1):
+        own = [run.torque * sign for run in evidence.used_runs if run.direction == sign]
+        against.append(sum(own) < 0)
+    if all(against):
+        run = evidence.used_runs[0]
+        raise IdentificationError(
+            f"E-SIGN: the torque acts against the motion in both directions (for example {run.log}: "
+            f"{run.torque:.4g} N m at {run.velocity:.4g} rad/s): friction would drive the link. Set `sign = "
+            "-1` for "
+            "torque or for position in [signals]."
+        )

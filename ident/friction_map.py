@@ -1,0 +1,278 @@
+"""Recordings into points of the friction map: torque against velocity, each with its standard error.
+
+At constant speed eq (1) leaves u = b v + F(v): the mean torque of a steady run is the friction at the run's
+speed. The speed is the slope of the position over the run, never the mean of differences: with 2000 counts
+a revolution at 1 kHz, 99.7 % of the differences at 0.01 rad/s are zero. What little the speed still
+changes within the run is taken off as J times the slope of the speed, once J is known.
+
+A run is one datum however many samples it has, since neighbouring samples share the ripple and the speed
+loop's hunting. Its own few blocks cannot tell its error either: that comes from a variance model pooled
+over all runs (`ident.variance_model`), for which each run hands on the white part of its noise.
+
+What a run has to survive:
+
+- E-QUANT: it must travel 20 counts, or its speed is the encoder's rounding;
+- E-STEADY: run-in and run-out are cut off; under half left, the run is left out;
+- E-STICKSLIP: with the link at rest in over 2 % of it, its mean torque is not the friction at its mean speed.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from data.protocols import ProtocolName
+from data.recording import FloatArray, Recording
+from ident.segmentation import Stretch, grain, plateaus, rests, stretches
+
+LEAST_COUNTS = 20.0
+BLOCKS = 20  # a window is judged in twentieths
+STILL_SHARE = 0.02
+RESOLVED_COUNTS = 6.0  # travel that tells motion from rest
+
+
+@dataclass(frozen=True)
+class MapPoint:
+    """One point of the friction map, or the run that gave none and why; a row of friction_map.csv."""
+
+    log: str
+    protocol: ProtocolName
+    direction: int  # +1 or -1
+    velocity: float  # signed [rad/s]; 0 for a breakaway
+    torque: float  # signed [N m], corrected for acceleration
+    stderr: float | None  # of the torque [N m]
+    velocity_stderr: float | None  # [rad/s]
+    ramp_rate: float | None  # signed [N m/s], breakaway only
+    start_time: float  # [s] from the log's first sample
+    end_time: float  # [s]
+    used: bool
+    why: str | None = None
+
+
+@dataclass(frozen=True)
+class SteadyRun:
+    """A stretch of constant speed. Signs are those of the log."""
+
+    log: str
+    velocity: float  # [rad/s]
+    velocity_stderr: float  # [rad/s]
+    torque: float  # mean as logged [N m]
+    acceleration: float  # slope of the speed [rad/s^2]
+    white_stderr: float  # of the mean torque, were the samples' scatter all [N m]
+    block_ratio: float  # variance of block means over what white scatter gives them
+    travel: float  # [rad], > 0
+    start_time: float  # [s]
+    end_time: float  # [s]
+    why: str | None = None  # why it is left out, beginning with its code
+
+    @property
+    def direction(self) -> int:
+        """+1 or -1."""
+        return 1 if self.velocity > 0 else -1
+
+
+def steady_runs(recording: Recording) -> tuple[SteadyRun, ...]:
+    """Every plateau of a constant-velocity log, those that are left out included, in order of time."""
+    chain = stretches(recording)
+    still = rests(recording, chain)
+    steps = plateaus(recording, chain)
+    if not steps:
+        return (_nothing_moved(recording),)
+    if _sticks_and_slips(recording, still, steps):
+        whole = Stretch(
+            0, recording.time.size, recording.duration, _travel(recording, 0, recording.time.size)
+        )
+        share = sum(rest.duration for rest in still) / recording.duration
+        return (
+            replace(
+                _measure(recording, whole),
+                why=f"E-STICKSLIP: the link rests {len(still)} times, in {100 * share:.0f} % of the log, "
+                "between "
+                "slips: the mean torque is not the friction at the mean speed. Raise the speed or the speed "
+                "loop's damping.",
+            ),
+        )
+    return tuple(_steady_run(recording, step) for step in steps)
+
+
+def _steady_run(recording: Recording, step: Stretch) -> SteadyRun:
+    counts = abs(step.travel) / grain(recording)
+    if counts < LEAST_COUNTS:
+        return replace(
+            _measure(recording, step),
+            why=f"E-QUANT: {counts:.1f} counts of travel, under {LEAST_COUNTS:.0f}: the speed is the "
+            "encoder's "
+            "rounding. Record it for longer.",
+        )
+    share = _share_at_rest(recording, step)
+    if share > STILL_SHARE:
+        return replace(
+            _measure(recording, step),
+            why=f"E-STICKSLIP: the link is at rest in {100 * share:.0f} % of the run: its mean torque is "
+            "not the "
+            "friction at its mean speed. Raise the speed or the speed loop's damping.",
+        )
+    window = _steady_window(recording, step)
+    left = (window.last - window.first) / (step.last - step.first)
+    run = _measure(recording, window)
+    if left < 0.5:
+        return replace(
+            run,
+            why=f"E-STEADY: speed or torque settles in only {100 * left:.0f} % of the run. Record it for "
+            "longer, or "
+            "set `window` to its steady part.",
+        )
+    return run
+
+
+def _measure(recording: Recording, window: Stretch) -> SteadyRun:
+    """Speed, torque and their scatter over a window of a log."""
+    part = slice(window.first, window.last)
+    time, position, torque = recording.time[part], recording.position[part], recording.torque[part]
+    centred = (time - time.mean()) / max(window.duration, recording.sample_period)
+    # Legendre-like basis: the quadratic leaves the slope at the middle of the window untouched.
+    basis = np.column_stack([np.ones_like(centred), centred, centred**2 - np.mean(centred**2)])
+    offset = position - position[0]
+    (_, slope, bend), *_ = np.linalg.lstsq(basis, offset, rcond=None)
+    duration = max(window.duration, recording.sample_period)
+    if time.size < 3:
+        slope, bend = offset[-1], 0.0
+    rounding = grain(recording) / duration * _rounding_share(recording, window)
+    hunting = _slope_scatter(centred, offset - basis @ np.array([offset.mean(), slope, bend])) / duration
+    bend_error = 12.0 * rounding / duration
+    acceleration = 2.0 * bend / duration**2
+    scatter = float(np.mean(np.diff(torque) ** 2)) / 2.0 if torque.size > 1 else 0.0
+    return SteadyRun(
+        log=recording.log,
+        velocity=float(slope / duration),
+        velocity_stderr=float(np.hypot(rounding, hunting)),
+        torque=float(torque.mean()),
+        acceleration=float(acceleration) if abs(acceleration) > 2.0 * bend_error else 0.0,
+        white_stderr=float(np.sqrt(scatter / torque.size)),
+        block_ratio=_block_ratio(torque, scatter),
+        travel=abs(_travel(recording, window.first, window.last)),
+        start_time=float(time[0]),
+        end_time=float(time[-1]),
+    )
+
+
+def _rounding_share(recording: Recording, window: Stretch) -> float:
+    """Standard error that rounding gives a slope, in grains over the window.
+
+    Over many counts the rounding is white: 1/sqrt(n) for n samples. Over few it is a sawtooth in step with
+    the window, of which a part of one count is left; two roundings at the ends are the worst of all.
+    """
+    counts = abs(_travel(recording, window.first, window.last)) / grain(recording)
+    samples = window.last - window.first
+    return float(min(6.0**-0.5, np.hypot(1.5 / max(counts, 1.0), samples**-0.5)))
+
+
+def _slope_scatter(centred: FloatArray, residual: FloatArray) -> float:
+    """Standard error of a slope over one unit of time, from block means of the residual (n,)."""
+    blocks = min(BLOCKS, residual.size // 2)
+    if blocks < 4:
+        return 0.0
+    means = np.array([piece.mean() for piece in np.array_split(residual - residual.mean(), blocks)])
+    middles = np.array([piece.mean() for piece in np.array_split(centred, blocks)])
+    return float(np.sqrt(np.sum(means**2) / (blocks - 3) / np.sum(middles**2)))
+
+
+def _block_ratio(torque: FloatArray, scatter: float) -> float:
+    blocks = min(BLOCKS, torque.size // 4)
+    if blocks < 4 or scatter == 0.0:
+        return 1.0
+    means = np.array([piece.mean() for piece in np.array_split(torque, blocks)])
+    return float(np.var(means, ddof=1) / (scatter * blocks / torque.size))
+
+
+def _steady_window(recording: Recording, step: Stretch) -> Stretch:
+    """The step without its run-in and run-out.
+
+    A twentieth is cut at each end, where a corner's place is not exact; further blocks go as long as their
+    speed or torque stands out from the middle half of the run.
+    """
+    edges = np.linspace(step.first, step.last, BLOCKS + 1).astype(int)
+    if np.any(np.diff(edges) < 2):
+        return step
+    last = np.minimum(edges[1:], recording.time.size - 1)
+    duration = recording.time[last] - recording.time[edges[:-1]]
+    speed = (recording.position[last] - recording.position[edges[:-1]]) / duration
+    torque = np.array([recording.torque[a:b].mean() for a, b in itertools.pairwise(edges)])
+    middle = slice(BLOCKS // 4, BLOCKS - BLOCKS // 4)
+    rounding = 2.0 * grain(recording) / duration
+    tolerance = np.maximum(rounding, 0.05 * abs(float(np.median(speed[middle]))))
+    odd = np.abs(speed - np.median(speed[middle])) > np.maximum(tolerance, 5.0 * _spread(speed[middle]))
+    odd |= np.abs(torque - np.median(torque[middle])) > np.maximum(
+        0.02 * abs(float(np.median(torque[middle]))), 5.0 * _spread(torque[middle])
+    )
+    start, end = 1, BLOCKS - 1
+    while start < end and odd[start]:
+        start += 1
+    while end > start and odd[end - 1]:
+        end -= 1
+    first, past = int(edges[start]), int(edges[end])
+    if past - first < 2:
+        return Stretch(step.first, step.first + 2, float(duration[0]), 0.0)
+    return Stretch(
+        first,
+        past,
+        float(recording.time[min(past, recording.time.size - 1)] - recording.time[first]),
+        _travel(recording, first, past),
+    )
+
+
+def _spread(values: FloatArray) -> float:
+    """Standard deviation from the median absolute deviation."""
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+
+
+def _share_at_rest(recording: Recording, step: Stretch) -> float:
+    """Part of the step in which the link moves under a tenth of what its mean speed asks for.
+
+    Judged over windows in which the mean speed covers six counts, so that counting is not taken for sticking.
+    """
+    time, position = recording.time[step.first : step.last], recording.position[step.first : step.last]
+    expected = RESOLVED_COUNTS * grain(recording)
+    windows = int(min(abs(step.travel) / expected, 2000, time.size // 2))
+    if windows < 2:
+        return 0.0
+    edges = np.linspace(0, time.size - 1, windows + 1).astype(int)
+    moved = np.abs(np.diff(position[edges]))
+    asked = abs(step.velocity) * np.diff(time[edges])
+    return float(np.mean(moved <= 0.1 * asked + grain(recording)))
+
+
+def _sticks_and_slips(recording: Recording, still: tuple[Stretch, ...], steps: tuple[Stretch, ...]) -> bool:
+    """Whether the log alternates between rests and slips of changing speed, always the same way.
+
+    A staircase with rests has one straight stretch a span; a slip is bent throughout.
+    """
+    moving_one_way = abs(sum(step.travel for step in steps)) > 0.9 * sum(abs(step.travel) for step in steps)
+    if len(still) < 4 or not moving_one_way:
+        return False
+    bends = [_bend(recording, step) for step in steps]
+    return len(steps) >= 2 * (len(still) - 1) and float(np.median(bends)) > 0.025
+
+
+def _bend(recording: Recording, step: Stretch) -> float:
+    """Relative change of speed from the first half of a step to the second."""
+    middle = (step.first + step.last) // 2
+    first = _travel(recording, step.first, middle) / max(middle - step.first, 1)
+    second = _travel(recording, middle, step.last) / max(step.last - middle, 1)
+    return abs(second - first) / max(abs(first), abs(second), float(np.finfo(np.float64).tiny))
+
+
+def _travel(recording: Recording, first: int, last: int) -> float:
+    end = min(last, recording.time.size - 1)
+    return float(recording.position[end] - recording.position[first])
+
+
+def _nothing_moved(recording: Recording) -> SteadyRun:
+    whole = Stretch(0, recording.time.size, recording.duration, 0.0)
+    counts = (recording.position.max() - recording.position.min()) / grain(recording)
+    return replace(
+        _measure(recording, whole),
+        why=f"E-QUANT: the link moves {counts:.1f} counts in the whole log: there is no speed to speak of.",
+    )

@@ -1,0 +1,198 @@
+"""From the fit's own parameters to those of the law, with intervals, covariance, and what is withheld."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from data.findings import Finding
+from data.recording import Axis, FloatArray
+from ident.confidence import Interval, profiled, quantile, symmetric
+from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate
+from ident.friction_fit import DIRECTIONS, Direction, FitData, FrictionFit, residuals
+from ident.withholding import withheld
+
+UNITS: Mapping[Axis, Mapping[str, str]] = {
+    "rotary": {
+        "inertia": "kg m^2",
+        "static_torque": "N m",
+        "coulomb_torque": "N m",
+        "stribeck_velocity": "rad/s",
+        "stribeck_shape": "-",
+        "viscous_damping": "N m s/rad",
+        "torque_offset": "N m",
+    },
+    "linear": {
+        "inertia": "kg",
+        "static_torque": "N",
+        "coulomb_torque": "N",
+        "stribeck_velocity": "m/s",
+        "stribeck_shape": "-",
+        "viscous_damping": "N s/m",
+        "torque_offset": "N",
+    },
+}
+PROFILED = ("static_torque", "stribeck_velocity", "stribeck_shape")  # chi-square is a poor parabola in these
+
+
+@dataclass(frozen=True)
+class Parameters:
+    """The parameters of the law of both directions and their mean."""
+
+    inertia: Estimate
+    curves: Mapping[Direction, Mapping[str, Estimate]]
+    mean: Mapping[str, Estimate]
+    covariance: Covariance
+    findings: tuple[Finding, ...]
+
+
+def parameters(data: FitData, fit: FrictionFit, *, axis: Axis, dof: int) -> Parameters:
+    """Values, errors and intervals in the law's own parameters."""
+    names, matrix = _physical_covariance(fit)
+    stderr = dict(zip(names, np.sqrt(np.diag(matrix)), strict=True))
+    units = UNITS[axis]
+    findings: list[Finding] = []
+    curves: dict[Direction, Mapping[str, Estimate]] = {}
+    for direction in DIRECTIONS:
+        curve, own = _curve(data, fit, direction, stderr=stderr, dof=dof, units=units)
+        curves[direction] = curve
+        findings += own
+    mean = {
+        name: _mean(name, curves, (names, matrix), dof=dof, unit=units[name]) for name in CURVE_PARAMETERS
+    }
+    return Parameters(
+        inertia=_inertia(data, fit, stderr, dof=dof, unit=units["inertia"]),
+        curves=curves,
+        mean=mean,
+        covariance=Covariance(names, matrix),
+        findings=tuple(findings),
+    )
+
+
+def _physical_covariance(fit: FrictionFit) -> tuple[tuple[str, ...], FloatArray]:
+    """Names 'inertia', 'positive.static_torque', ... and their covariance: F_s = F_c + dF instead of dF."""
+    names = []
+    transform = np.eye(len(fit.free))
+    for row, name in enumerate(fit.free):
+        direction, _, parameter = name.partition("_")
+        if parameter == "stribeck_torque":
+            transform[row, fit.free.index(f"{direction}_coulomb_torque")] = 1.0
+            parameter = "static_torque"
+        names.append(f"{direction}.{parameter}" if parameter else name)
+    return tuple(names), np.asarray(transform @ fit.covariance @ transform.T)
+
+
+def _curve(
+    data: FitData,
+    fit: FrictionFit,
+    direction: Direction,
+    *,
+    stderr: Mapping[str, float],
+    dof: int,
+    units: Mapping[str, str],
+) -> tuple[Mapping[str, Estimate], tuple[Finding, ...]]:
+    coulomb, stribeck, velocity, damping, shape = fit.law(direction)
+    values = {
+        "static_torque": coulomb + stribeck,
+        "coulomb_torque": coulomb,
+        "stribeck_velocity": velocity,
+        "stribeck_shape": shape,
+        "viscous_damping": damping,
+    }
+    own = {name: stderr[f"{direction}.{name}"] for name in values if f"{direction}.{name}" in stderr}
+    interval = {name: symmetric(values[name], error, dof, least=0.0) for name, error in own.items()}
+    position = fit.free.index(f"{direction}_stribeck_torque")
+    interval["stribeck_torque"] = symmetric(stribeck, float(np.sqrt(fit.covariance[position, position])), dof)
+    for name in PROFILED:
+        if name in own and np.isfinite(own[name]) and stribeck > 0:
+            interval[name] = _profile(data, fit, direction, name, stderr=own[name], dof=dof)
+    kept = withheld(data, fit, direction, stderr=own, interval=interval)
+    estimates = {}
+    for name, value in values.items():
+        if name in kept.reasons:
+            estimates[name] = Estimate(None, units[name], withheld=kept.reasons[name])
+        elif name not in own:
+            estimates[name] = Estimate(value, units[name], fixed=True)
+        else:
+            ends = (interval[name].low, interval[name].high)
+            estimates[name] = Estimate(value, units[name], float(own[name]), ends)
+    return estimates, kept.findings
+
+
+def _profile(
+    data: FitData, fit: FrictionFit, direction: Direction, name: str, *, stderr: float, dof: int
+) -> Interval:
+    """Profile of one parameter; for F_s the fit is written in F_c and F_s - F_c all the same."""
+    free = list(fit.free)
+    static = name == "static_torque"
+    index = free.index(f"{direction}_{'stribeck_torque' if static else name}")
+    coulomb = free.index(f"{direction}_coulomb_torque")
+
+    def own(x: FloatArray) -> FloatArray:
+        values = dict(fit.values) | dict(zip(free, x, strict=True))
+        if static:
+            values[free[index]] = max(x[index] - x[coulomb], 0.0)
+        return residuals(data, values)
+
+    best = np.array([fit.values[key] for key in free])
+    if static:
+        best[index] += best[coulomb]
+    least = np.array([0.05 if key.endswith("shape") else 0.0 for key in free])
+    least = np.where([key.endswith("velocity") for key in free], 1e-9 * best, least)
+    return profiled(own, best, index, stderr=stderr, dof=dof, least=least)
+
+
+def _mean(
+    name: str,
+    curves: Mapping[Direction, Mapping[str, Estimate]],
+    covariance: tuple[tuple[str, ...], FloatArray],
+    *,
+    dof: int,
+    unit: str,
+) -> Estimate:
+    """Mean of the two directions: of what Table 1 calls the symmetric model."""
+    pair = [curves[direction][name] for direction in DIRECTIONS]
+    values = [estimate.value for estimate in pair if estimate.value is not None]
+    if len(values) < 2:
+        lacking = "; ".join(estimate.withheld for estimate in pair if estimate.withheld)
+        return Estimate(None, unit, withheld=lacking)
+    value = 0.5 * sum(values)
+    if any(estimate.fixed for estimate in pair):
+        return Estimate(value, unit, fixed=True)
+    names, matrix = covariance
+    where = [names.index(f"{direction}.{name}") for direction in DIRECTIONS]
+    stderr = 0.5 * float(np.sqrt(matrix[np.ix_(where, where)].sum()))
+    ends = symmetric(value, stderr, dof, least=0.0)
+    ends = _opened(ends, pair)
+    return Estimate(value, unit, stderr, (ends.low, ends.high))
+
+
+def _opened(ends: Interval, pair: list[Estimate]) -> Interval:
+    """An end that either direction leaves open is open in the mean."""
+    for estimate in pair:
+        low, high = estimate.interval95 or (None, None)
+        ends = replace(
+            ends, low=ends.low if low is not None else None, high=ends.high if high is not None else None
+        )
+    return ends
+
+
+def _inertia(
+    data: FitData, fit: FrictionFit, stderr: Mapping[str, float], *, dof: int, unit: str
+) -> Estimate:
+    if not data.has_inertia:
+        return Estimate(
+            None,
+            unit,
+            withheld="E-TESTS: neither motion after a breakaway nor a frequency response was recorded, and "
+            "steady "
+            "runs do not hold the inertia. Record ramps until the link runs, or a multisine about a bias "
+            "speed.",
+        )
+    value, error = fit.values["inertia"], float(stderr["inertia"])
+    if not (value > 0 and np.isfinite(error)):
+        return Estimate(None, unit, withheld="E-BOUND: the inertia ended at its bound 0; record a multisine.")
+    reach = quantile(dof) * error
+    return Estimate(value, unit, error, (max(value - reach, 0.0), value + reach))

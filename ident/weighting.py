@@ -1,0 +1,191 @@
+"""The evidence as data for the fit: corrected, and weighted by what the last fit has shown of its errors.
+
+Everything that depends on the law is taken from the fit before: the ramp's rise between onset and detection,
+the torque error that a speed error amounts to (slope of the law times the speed's error), the spread between
+runs, places and ramps. A few rounds settle it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from data.recording import FloatArray
+from ident.breakaway import Breakaway
+from ident.evidence import Evidence
+from ident.friction_fit import (
+    DIRECTIONS,
+    SIGN,
+    Direction,
+    FitData,
+    FrictionFit,
+    fit_friction,
+    friction_torque,
+)
+from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
+from ident.model.robot import OneLinkRobot
+from ident.momentum import Momentum
+from ident.response import breakaway_delay
+from ident.variance_model import RunSpread, run_spread, white_variance
+
+ROUNDS = 5
+FIRST_SPREAD = 0.01  # of the torque, before anything is known
+PRIOR_STARTS = 4.0  # breakaways that the runs' spread is worth
+
+
+@dataclass(frozen=True)
+class Weighted:
+    """The settled fit and the data as it was weighted."""
+
+    data: FitData
+    fit: FrictionFit
+    spread: RunSpread
+
+
+def settle(evidence: Evidence, *, inertia: tuple[float, float] | None, free_beta: bool) -> Weighted:
+    """Fit, weigh anew, and fit again until the weights have settled."""
+    data = _first_data(evidence, inertia)
+    fit = fit_friction(data, free_beta=False)
+    spread = RunSpread(0.0, np.inf)
+    for number in range(ROUNDS):
+        data, spread = _reweighted(evidence, data, fit)
+        last = number == ROUNDS - 1
+        fit = fit_friction(data, free_beta=free_beta, start=None if last or number == 0 else fit)
+    return Weighted(data, fit, spread)
+
+
+def fitted_robot(fit: FrictionFit) -> OneLinkRobot | None:
+    """The robot of a fit, where its values are a robot's."""
+    curves = {}
+    try:
+        for direction in DIRECTIONS:
+            coulomb, stribeck, velocity, damping, shape = fit.law(direction)
+            curves[direction] = StribeckCurve(coulomb + stribeck, coulomb, velocity, damping, shape)
+        return OneLinkRobot(fit.values["inertia"], StribeckFriction(**curves))
+    except ModelError:
+        return None
+
+
+def _first_data(evidence: Evidence, inertia: tuple[float, float] | None) -> FitData:
+    runs, starts = evidence.used_runs, evidence.used_starts
+    run_direction = np.array([run.direction for run in runs], dtype=np.int64)
+    start_direction = np.array([start.direction for start in starts], dtype=np.int64)
+    torque = np.array([run.direction * run.torque for run in runs], dtype=np.float64)
+    begun = np.array([start.direction * start.torque for start in starts], dtype=np.float64)
+    typical = FIRST_SPREAD * float(np.median(np.abs(torque)))
+    line = np.array([start.line.stderr for start in starts])
+    return FitData(
+        run_direction=run_direction,
+        speed=np.array([abs(run.velocity) for run in runs]),
+        torque=torque,
+        acceleration=np.array([run.acceleration for run in runs]) * run_direction,
+        run_stderr=np.sqrt(white_variance(runs) + typical**2),
+        start_direction=start_direction,
+        start_torque=begun,
+        start_stderr=np.hypot(line, typical),
+        momenta=evidence.momenta,
+        whitening=tuple(
+            _whitening(motion, 0.0, RunSpread(typical, np.inf), scale=1.0) for motion in evidence.momenta
+        ),
+        inertia=inertia,
+    )
+
+
+def _reweighted(evidence: Evidence, data: FitData, fit: FrictionFit) -> tuple[FitData, RunSpread]:
+    runs, starts = evidence.used_runs, evidence.used_starts
+    parameters = sum(name != "inertia" for name in fit.free)
+    residual, slope = _run_residuals(data, fit)
+    own = white_variance(runs) + (slope * np.array([run.velocity_stderr for run in runs])) ** 2
+    travel = np.array([run.travel for run in runs])
+    spread = run_spread(residual, travel, own, parameters)
+    start_torque, delay_error = _onset_torque(starts, fit)
+    line = np.hypot(np.array([start.line.stderr for start in starts]), delay_error)
+    place = _place_spread(data, fit, start_torque, line, spread)
+    scale = _motion_scale(data.momenta, fit, spread)
+    weighted = replace(
+        data,
+        run_stderr=np.sqrt(own + spread.variance(travel)),
+        start_torque=start_torque,
+        start_stderr=np.sqrt(line**2 + place),
+        whitening=tuple(
+            _whitening(motion, fit.values["inertia"], spread, scale=scale) for motion in data.momenta
+        ),
+    )
+    return weighted, spread
+
+
+def _run_residuals(data: FitData, fit: FrictionFit) -> tuple[FloatArray, FloatArray]:
+    """Torque less the law's (n,) [N m], and the law's slope (n,) [N m s/rad]."""
+    residual, slope = np.zeros_like(data.torque), np.zeros_like(data.torque)
+    for direction in DIRECTIONS:
+        own = data.run_direction == SIGN[direction]
+        law, speed = fit.law(direction), data.speed[own]
+        predicted = friction_torque(law, speed) + fit.values["inertia"] * data.acceleration[own]
+        residual[own] = data.torque[own] - predicted
+        step = 1e-4 * speed
+        slope[own] = (friction_torque(law, speed + step) - friction_torque(law, speed - step)) / (2 * step)
+    return residual, slope
+
+
+def _onset_torque(starts: Sequence[Breakaway], fit: FrictionFit) -> tuple[FloatArray, FloatArray]:
+    """Torque at the onset (m,) [N m], magnitudes, and the error that the delay may bring (m,)."""
+    robot = fitted_robot(fit)
+    torque, error = np.zeros(len(starts)), np.zeros(len(starts))
+    for number, start in enumerate(starts):
+        rate, torque[number] = abs(start.line.rate), abs(start.torque)
+        if robot is None:
+            continue
+        direction: Direction = "positive" if start.direction > 0 else "negative"
+        delays = [
+            breakaway_delay(robot, direction=direction, ramp_rate=rate, travel=start.travel + off)
+            for off in (-start.travel_stderr, 0.0, start.travel_stderr)
+        ]
+        torque[number] -= rate * delays[1]
+        error[number] = rate * 0.5 * (delays[2] - delays[0])
+    return torque, error
+
+
+def _place_spread(
+    data: FitData, fit: FrictionFit, torque: FloatArray, line: FloatArray, spread: RunSpread
+) -> float:
+    """Variance of F_s from place to place [(N m)^2], pooled over directions and with the runs' spread."""
+    excess, degrees = PRIOR_STARTS * spread.spread**2, PRIOR_STARTS
+    for direction in DIRECTIONS:
+        own = data.start_direction == SIGN[direction]
+        if np.count_nonzero(own) < 2:
+            continue
+        coulomb, stribeck, *_ = fit.law(direction)
+        residual = torque[own] - np.mean(torque[own])
+        excess += max(0.0, float(np.sum(residual**2 - line[own] ** 2)))
+        degrees += np.count_nonzero(own) - 1
+        misfit = float(np.mean(torque[own])) - coulomb - stribeck
+        excess += max(0.0, misfit**2 - float(np.mean(line[own] ** 2)) / np.count_nonzero(own))
+    return float(excess / degrees)
+
+
+def _whitening(motion: Momentum, inertia: float, spread: RunSpread, *, scale: float) -> FloatArray:
+    """Inverse square root of the covariance of a motion's windows (k, k)."""
+    place = spread.variance(motion.travel) * motion.duration**2
+    covariance = inertia**2 * motion.speed_covariance + np.diag(motion.impulse_variance + place)
+    covariance = covariance + 1e-12 * float(np.trace(covariance)) * np.eye(motion.gain.size)
+    return np.asarray(np.linalg.inv(np.linalg.cholesky(scale * covariance)))
+
+
+def _motion_scale(momenta: Sequence[Momentum], fit: FrictionFit, spread: RunSpread) -> float:
+    """Factor on the momenta's covariance under which each ramp, as one datum, strays by its own error."""
+    if not momenta:
+        return 1.0
+    inertia = fit.values["inertia"]
+    total, strayed, windows = 0.0, 0.0, 0
+    for motion in momenta:
+        law = fit.law("positive" if motion.direction > 0 else "negative")
+        whitening = _whitening(motion, inertia, spread, scale=1.0)
+        residual = whitening @ motion.residual(inertia, law)
+        gain = whitening @ motion.gain
+        strayed += float(residual @ gain) ** 2 / float(gain @ gain)
+        total += float(residual @ residual)
+        windows += residual.size
+    ramps = len(momenta)
+    return max(1.0, strayed / max(ramps - 1, 1), total / max(windows - 1, 1))
