@@ -132,19 +132,17 @@ def _played_multisine(rig: VirtualRig, bench: Bench, generator: np.random.Genera
     bias = settings.bias or rounded(40.0 * curve.stribeck_velocity)
     hold = 2.0 * robot.inertia  # [N m s/rad]: a pole at 2 rad/s, far below the lowest line
     n = round(settings.period / bench.period)
-    harmonics = odd_lines(
-        settings.lowest * settings.period, settings.highest * settings.period, settings.lines
-    )
-    angle = 2 * np.pi * np.outer(np.arange(n) / n, harmonics) + generator.uniform(
-        0, 2 * np.pi, harmonics.size
-    )
-    size = (
-        harmonics**0.25
-    )  # flat torque would spend the swing on the lowest line, flat speed the torque on the highest
+    lowest, highest = settings.lowest * settings.period, settings.highest * settings.period
+    harmonics = odd_lines(lowest, highest, settings.lines)
+    phases = generator.uniform(0, 2 * np.pi, harmonics.size)
+    lines = np.exp(1j * (2 * np.pi * np.outer(np.arange(n) / n, harmonics) + phases))
     rate = 2 * np.pi * harmonics / settings.period
     impedance = 1j * rate * robot.inertia + curve.viscous_damping + hold
-    swing = np.max(np.abs((np.exp(1j * angle) @ (size / impedance)).real))
-    signal = settings.swing * bias / swing * (np.cos(angle) @ size) + float(curve.total(bias))
+    swing = float(np.max(np.abs((lines @ (1.0 / impedance)).real)))
+    waves = np.sum(lines.real, axis=1)  # the same torque in every line
+    friction = float(curve.total(bias))
+    room = max(0.9 * bench.torque_limit - friction, 0.0) / float(np.max(np.abs(waves)))
+    signal = friction + min(settings.swing * bias / swing, room) * waves
     whole = np.tile(signal, settings.periods + 2)
     return play_torque(bench, whole, lead=2 * n, start=0.0, speed=bias, hold=hold)
 
@@ -157,9 +155,7 @@ def odd_lines(lowest: float, highest: float, lines: int) -> FloatArray:
 
 
 def excitations(rig: VirtualRig, bench: Bench) -> Iterator[Run]:
-    """Free motion under known torque: three incommensurate sines that drive the link through both
-    directions.
-    """
+    """Free motion under known torque: three incommensurate sines, through both directions."""
     for number in (1, 2):
         yield Run(f"{number}", {}, partial(_played_excitation, rig, bench))
 

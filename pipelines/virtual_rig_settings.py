@@ -108,7 +108,7 @@ class MultisineSettings(_Table):
     period: Positive = 2.0  # [s]
     periods: Annotated[int, Field(ge=2, le=100)] = 4  # in a log
     realisations: Annotated[int, Field(ge=2, le=100)] = 6  # logs, each with other phases
-    swing: Annotated[float, Field(gt=0, lt=0.9)] = 0.35  # largest deviation of the speed, part of the bias
+    swing: Annotated[float, Field(gt=0, lt=0.9)] = 0.3  # largest deviation of the speed, part of the bias
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
