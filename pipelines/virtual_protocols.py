@@ -129,7 +129,7 @@ def multisines(rig: VirtualRig, bench: Bench) -> Iterator[Run]:
 def _played_multisine(rig: VirtualRig, bench: Bench, generator: np.random.Generator) -> Motion:
     settings, robot = rig.multisine, rig.true_robot()
     curve = robot.friction.positive
-    bias = settings.bias or rounded(40.0 * curve.stribeck_velocity)
+    bias = settings.bias or rounded(40.0 * robot.mean().friction.positive.stribeck_velocity)
     hold = 2.0 * robot.inertia  # [N m s/rad]: a pole at 2 rad/s, far below the lowest line
     n = round(settings.period / bench.period)
     lowest, highest = settings.lowest * settings.period, settings.highest * settings.period

@@ -74,12 +74,12 @@ def record(campaign: Campaign, into: Path, progress: Tell = _silent) -> list[Pat
     if rig is None:
         raise CampaignError(f"{campaign.path}: no [virtual_rig] table: there is nothing to record from")
     takes = [take for experiment in campaign.experiments for take in _takes(campaign, rig, experiment)]
-    _nothing_in_the_way(campaign, into, takes)
+    _make_room(campaign, into, takes)
     encoder = Encoder(_resolution(campaign, rig))
     channel = _torque_channel(rig)
     generators = np.random.default_rng(rig.seed).spawn(len(takes))
     truth = into / TRUTH
-    write_atomically(truth, json.dumps(_truth(campaign, rig), indent=2) + "\n")
+    write_atomically(truth, json.dumps(_truth(campaign, rig, takes), indent=2) + "\n")
     written = []
     for done, (take, generator) in enumerate(zip(takes, generators, strict=True)):
         progress(take.log, done, len(takes))
@@ -144,31 +144,44 @@ def _names(campaign: Campaign, patterns: Sequence[str], runs: Sequence[Run]) -> 
             )
 
 
-def _nothing_in_the_way(campaign: Campaign, into: Path, takes: Sequence[_Take]) -> None:
-    """Refuse to write over logs of a real rig, and beside logs that the patterns would mix with these."""
+def _make_room(campaign: Campaign, into: Path, takes: Sequence[_Take]) -> None:
+    """Remove what an earlier recording left; refuse to touch, or to record beside, what it did not write."""
     names = [take.log for take in takes]
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise CampaignError(
             f"{campaign.path}: logs: two runs would both be {twice}: give each experiment names of its own"
         )
-    present = [name for name in names if (into / name).exists()]
-    if present and not (into / TRUTH).exists():
+    earlier = _logs_of_earlier_recording(into / TRUTH)
+    foreign = sorted(name for name in names if name not in earlier and (into / name).exists())
+    if foreign:
         raise CampaignError(
-            f"{into / present[0]}: is there already, with no {TRUTH} beside it: it may be a real rig's log, "
-            "and is not written over. Record into another folder, or remove it"
+            f"{into / foreign[0]}: is there already, and {TRUTH} does not name it: it may be a real "
+            "rig's log and is not written over. Record into another folder, or remove it"
         )
-    others = {
+    matching = {
         PurePath(path).as_posix()
         for experiment in campaign.experiments
         for pattern in experiment.log_patterns
         for path in glob.glob(pattern, root_dir=into, recursive=True)
-    } - set(names)
+    }
+    others = sorted(matching - set(names) - earlier)
     if others:
         raise CampaignError(
-            f"{into / min(others)}: matches a pattern of {campaign.path.name} but would not be recorded now: "
-            f"an identification would mix it with the new logs. Remove it ({len(others)} in all)"
+            f"{into / others[0]}: matches a pattern of {campaign.path.name} and is not recorded now: an "
+            f"identification would mix it with the simulated logs. Remove it ({len(others)} in all)"
         )
+    for name in (matching & earlier) - set(names):
+        (into / name).unlink()
+
+
+def _logs_of_earlier_recording(truth: Path) -> set[str]:
+    """The logs that a truth.json names; none where there is no such file, or none of ours."""
+    try:
+        logs = json.loads(truth.read_text(encoding="utf-8"))["logs"]
+    except (OSError, ValueError, KeyError, TypeError):
+        return set()
+    return {log for log in logs if isinstance(log, str)} if isinstance(logs, list) else set()
 
 
 def _resolution(campaign: Campaign, rig: VirtualRig) -> float:
@@ -197,7 +210,7 @@ def _ripple(campaign: Campaign, rig: VirtualRig) -> TorqueRipple:
     return TorqueRipple(rig.ripple.amplitude * coulomb, rig.ripple.harmonic * turn, rig.ripple.phase)
 
 
-def _truth(campaign: Campaign, rig: VirtualRig) -> dict[str, object]:
+def _truth(campaign: Campaign, rig: VirtualRig, takes: Sequence[_Take]) -> dict[str, object]:
     """What truth.json says: the robot in SI, and how it was measured."""
     robot = rig.true_robot()
     return {
@@ -214,4 +227,5 @@ def _truth(campaign: Campaign, rig: VirtualRig) -> dict[str, object]:
         "torque_noise": _torque_noise(rig),
         "ripple": asdict(_ripple(campaign, rig)),
         "seed": rig.seed,
+        "logs": [take.log for take in takes],
     }
