@@ -13,7 +13,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 import pandas as pd
@@ -58,6 +58,14 @@ def write_csv(
     write_atomically(path, head + table)
 
 
+# From pandas 3.1 on the default float parser is exact and the option is gone.
+_EXACT: Final[dict[str, str]] = (
+    {}
+    if tuple(int(part) for part in pd.__version__.split(".")[:2]) >= (3, 1)
+    else {"float_precision": "round_trip"}
+)
+
+
 @dataclass(frozen=True)
 class CsvTable:
     """The columns of one file that were asked for."""
@@ -90,7 +98,7 @@ def read_csv(content: bytes, layout: CsvLayout, wanted: Collection[int]) -> CsvT
         "skiprows": layout.first_row,
         "skipinitialspace": True,
         "engine": "c",
-        "float_precision": "round_trip",
+        **_EXACT,
     }
     try:
         table = pd.read_csv(BytesIO(text), dtype=np.float64, **options)

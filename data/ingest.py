@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data.alignment import align
+from data.csv_describe import TIME_NAMES
 from data.csv_dialect import bare, sniff
 from data.csv_log import find_column, read_csv
 from data.field_path import FieldPath, parse_path
@@ -35,7 +36,7 @@ from data.signals import Clock, RigSignals, Signal, Signals, log_format
 from data.units import Quantity, known_unit, same_unit, si_word
 
 FloatArray = NDArray[np.float64]
-_TIME_NAMES: Final = ("t", "time", "__time", "timestamp")  # CSV columns that are plainly the time
+
 _TURN: Final = 2.0 * np.pi
 
 
@@ -228,11 +229,11 @@ def _read_csv(door: _Door, content: ByteArray) -> _Logged:
 def _plain_time(headers: tuple[str, ...], units: tuple[str | None, ...]) -> Signal:
     """The column that is plainly the time, with the unit that its header declares."""
     for k, header in enumerate(headers):
-        if bare(header).lower() in _TIME_NAMES:
+        if bare(header).lower() in TIME_NAMES:
             return Signal(k, unit=units[k] if units[k] else None)
     raise LogError(
         "[signals] names no time for csv logs, and no column is plainly the time "
-        f'(one of {", ".join(_TIME_NAMES)}); add time = {{ csv = "..." }}'
+        f'(one of {", ".join(TIME_NAMES)}); add time = {{ csv = "..." }}'
     )
 
 

@@ -1,0 +1,188 @@
+"""What a log holds, with no settings at all: channels, units, rate, clock, gaps, integrity, what is lost.
+
+The answer is a value: `to_plain` gives it to a program (schema `stribeck/inspection/1`), `inspection_text`
+draws it for a person. Its status says whether the log is whole, readable in part, or not at all.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from data import csv_describe, mcap_describe
+from data.csv_describe import CsvDescription
+from data.findings import LogError
+from data.ingest import read_bytes
+from data.integrity import Integrity
+from data.mcap_describe import McapDescription
+from data.signals import Format, log_format
+from pipelines.exit_status import Status
+
+SCHEMA: Final = "stribeck/inspection/1"
+MANY: Final = "stribeck/inspections/1"
+
+
+@dataclass(frozen=True)
+class Inspection:
+    """One log, described."""
+
+    log: str
+    file_format: Format
+    size: int  # [bytes]
+    seconds: float  # that the inspection took
+    content: McapDescription | CsvDescription
+
+    @property
+    def integrity(self) -> Integrity:
+        """What is proved of the file."""
+        return self.content.integrity
+
+    @property
+    def status(self) -> Status:
+        """Whole: DONE. Readable in part: WITHHELD. Not at all: REFUSED."""
+        if self.integrity.whole:
+            return Status.DONE
+        return Status.WITHHELD if self.integrity.messages else Status.REFUSED
+
+    @property
+    def simulated(self) -> bool:
+        """Whether a virtual rig wrote it."""
+        return self.content.metadata.get("simulated", "").strip().lower() == "true"
+
+
+def inspect_log(path: Path) -> Inspection:
+    """Describe a log.
+
+    Raises
+    ------
+    LogError
+        When it cannot be read at all.
+    """
+    begin = time.perf_counter()
+    log = path.as_posix()
+    file_format = log_format(path)
+    content = read_bytes(path, log=log)
+    found: McapDescription | CsvDescription
+    if file_format == "mcap":
+        found = mcap_describe.describe(content)
+    else:
+        try:
+            found = csv_describe.describe(content.tobytes())
+        except LogError as error:
+            raise LogError(f"{log}: {error}") from error
+    inspection = Inspection(log, file_format, content.size, time.perf_counter() - begin, found)
+    if inspection.status is Status.REFUSED:
+        inspection.integrity.require(log, salvage=True)
+    return inspection
+
+
+def to_plain(inspection: Inspection) -> dict[str, Any]:
+    """The inspection as plain values, ready for JSON. Times are seconds, sizes bytes."""
+    content = inspection.content
+    shared: dict[str, Any] = {
+        "schema": SCHEMA,
+        "log": inspection.log,
+        "format": inspection.file_format,
+        "bytes": inspection.size,
+        "status": {Status.DONE: "whole", Status.WITHHELD: "partly readable"}.get(
+            inspection.status, "unreadable"
+        ),
+        "simulated": inspection.simulated,
+        "integrity": _integrity(inspection.integrity),
+        "metadata": dict(content.metadata),
+    }
+    if isinstance(content, McapDescription):
+        return shared | {
+            "profile": content.profile,
+            "library": content.library,
+            "chunks": dict(content.compressions),
+            "indexed": content.indexed,
+            "channels": [_with_rates(asdict(channel)) for channel in content.channels],
+            "empty_topics": list(content.empty_topics),
+            "attachments": [asdict(label) for label in content.attachments],
+        }
+    layout = content.layout
+    return shared | {
+        "dialect": {
+            "delimiter": layout.delimiter,
+            "decimal": layout.decimal,
+            "encoding": layout.encoding,
+            "header": bool(layout.headers),
+            "comment": layout.comment,
+            "lines_before_numbers": layout.first_row,
+        },
+        "rows": content.rows,
+        "columns": [asdict(column) for column in content.columns],
+        "clock": _rated(asdict(content.clock)) if content.clock else None,
+        "clock_column": content.clock_column,
+    }
+
+
+def _integrity(found: Integrity) -> dict[str, Any]:
+    return {
+        "checksums": found.checksums,
+        "whole": found.whole,
+        "chunks": found.chunks,
+        "messages": found.messages,
+        "lost": [
+            {
+                "begin": loss.begin,
+                "end": loss.end,
+                "why": loss.why,
+                "log_time": None if loss.time_range is None else [t * 1e-9 for t in loss.time_range],
+            }
+            for loss in found.losses
+        ],
+        "notes": list(found.notes),
+    }
+
+
+def _with_rates(channel: dict[str, Any]) -> dict[str, Any]:
+    clocks = {name: _rated(channel[name]) for name in ("log_clock", "header_clock") if channel[name]}
+    return channel | {"header_clock": None} | clocks
+
+
+def _rated(clock: dict[str, Any]) -> dict[str, Any]:
+    return clock | {"rate": 1.0 / clock["period"] if clock["period"] > 0.0 else None}
+
+
+def _finite(value: Any) -> Any:
+    """The same value with null where a number is not finite, which JSON cannot say."""
+    if isinstance(value, dict):
+        return {key: _finite(inside) for key, inside in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(inside) for inside in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def inspect_logs(logs: Sequence[Path], *, as_json: bool = False) -> Status:
+    """Inspect logs and print each; the gravest status of all."""
+    from pipelines.inspection_text import print_inspection  # noqa: PLC0415  # rich is only needed to print
+
+    worst, answers = Status.DONE, []
+    for path in logs:
+        try:
+            inspection = inspect_log(path)
+        except LogError as error:
+            worst = Status.REFUSED
+            answers.append(
+                {"schema": SCHEMA, "log": path.as_posix(), "status": "unreadable", "error": str(error)}
+            )
+            print(f"stribeck: {error}", file=sys.stderr)
+            continue
+        if worst is Status.DONE:
+            worst = inspection.status
+        if as_json:
+            answers.append(to_plain(inspection))
+        else:
+            print_inspection(inspection)
+    if as_json:
+        whole = answers[0] if len(answers) == 1 else {"schema": MANY, "logs": answers}
+        print(json.dumps(_finite(whole), indent=1, allow_nan=False))
+    return worst
