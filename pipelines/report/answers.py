@@ -141,7 +141,7 @@ def start_name(start: object) -> str:
 
 
 def _counted(notes: Counter[str]) -> list[str]:
-    words = {"refuse": "refused", "withhold": "withheld", "warn": "to know"}
+    words = {"refuse": "refused", "withhold": "withheld", "warn": "to note"}
     return [f"{notes[severity]} {word}" for severity, word in words.items() if notes[severity]]
 
 

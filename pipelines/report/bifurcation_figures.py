@@ -44,11 +44,11 @@ def figure9(
         if branch.kind not in named:
             _name(axes, branch)
             named.add(branch.kind)
-    for bifurcation in diagram.bifurcations:
+    for number, bifurcation in enumerate(diagram.bifurcations):
         axes.axvline(bifurcation.value, color=INK, linewidth=0.9, linestyle=(0, (1.5, 2)), zorder=2.5)
         axes.annotate(
-            f"{bifurcation.kind.replace('_', ' ')}, {diagram.parameter} = {bifurcation.value:.4g}",
-            (bifurcation.value, 1.0), (-4, -2), xycoords=("data", "axes fraction"),
+            f"{bifurcation.kind.replace('_', ' ')}\n{diagram.parameter} = {bifurcation.value:.4g}",
+            (bifurcation.value, 1.0), (-4, -2 - 24 * number), xycoords=("data", "axes fraction"),
             textcoords="offset points", ha="right", va="top", fontsize=8.0, color=MUTED, parse_math=False,
         )  # fmt: skip
     unit = units_of(axis).position

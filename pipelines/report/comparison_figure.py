@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from pipelines.report.axis_units import units_of
+from pipelines.report.axis_units import AxisUnits, units_of
 from pipelines.report.bifurcation_figures import branch_arrays, draw_branch
 from pipelines.report.drawn_values import DrawnDiagram
 from pipelines.report.onset_panel import ROW, Onset, draw_onsets, legend_beside, start_label
@@ -66,6 +66,7 @@ def figure10(
     groups = [start_label(_nearest(run["start"], known)) for run in runs]
     colours = _colours([*groups, *map(start_label, known)])
     strip = 1.05 + ROW * len(onsets) if onsets else 0.0
+    subtitle = subtitle or _shared_gains(onsets, units_of(axis))
     figure = new_figure(title, height=4.6 + strip, subtitle=subtitle, simulated=simulated)
     unit = units_of(axis).position
     if onsets:
@@ -90,6 +91,22 @@ def figure10(
     handles = _legend(runs, colours, unit, fitted=fitted is not None, symmetric=symmetric is not None)
     legend_beside(main, handles)
     return figure
+
+
+def _shared_gains(onsets: Sequence[Onset], units: AxisUnits) -> str:
+    """The controller's gains, where all runs share them."""
+    gains = {str(onset.get("gains")): onset.get("gains") for onset in onsets}
+    only = next(iter(gains.values())) if len(gains) == 1 else None
+    if not isinstance(only, Mapping):
+        return ""
+    named = (
+        ("proportional_gain", "n₁", f"{units.torque}/{units.position}"),
+        ("derivative_gain", "n₂", units.damping),
+        ("observer_gain", "L", "1/s"),
+    )
+    return ", ".join(
+        f"{name} = {only[entry]:.6g} {unit}" for entry, name, unit in named if only.get(entry) is not None
+    )
 
 
 def _draw_symmetric(axes: Axes, diagram: DrawnDiagram) -> None:

@@ -42,8 +42,8 @@ def figure4(
     axes.fill_between(observer_gain, *exact.T, color=BLUE, alpha=0.28, linewidth=0, zorder=2)
     low, high = axes.get_ylim()
     axes.annotate(
-        "no compensation, r = 0", (observer_gain[0], float(np.max(uncompensated[0]))), (8, -8),
-        textcoords="offset points", va="top", color=MUTED,
+        "no compensation, r = 0", (observer_gain[-1], float(np.max(uncompensated[-1]))), (-8, -8),
+        textcoords="offset points", ha="right", va="top", color=MUTED,
     )  # fmt: skip
     axes.annotate(
         "exact compensation, r = 1", (observer_gain[0], float(np.max(exact[0]))), (8, 3),

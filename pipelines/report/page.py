@@ -61,6 +61,7 @@ def report_page(
         runs=_every_log(robot or {}, comparison or {}),
         notes=_by_severity((robot or {}).get("notes") or ()),
         design=design,
+        certificates=_by_case((design or {}).get("certificates") or ()),
         comparison=comparison,
         figures=pictures,
         fit_report=_printable_lines(fit_report[:_LONGEST_REPORT]) if fit_report else None,
@@ -145,6 +146,15 @@ def _outcome(outcome: Mapping[str, Any] | None) -> str:
         rest = outcome.get("position_error", outcome.get("x1_max"))
         return "rests" if rest is None else f"rests at {shown_number(rest)}"
     return shown(verdict, 60)
+
+
+def _by_case(rows: Iterable[Mapping[str, Any]]) -> list[tuple[str, list[Mapping[str, Any]]]]:
+    """The certificates of each robot under each compensator, under a heading that says which."""
+    cases: dict[str, list[Mapping[str, Any]]] = {}
+    for row in rows:
+        robot = f"robot: {row['robot']}; " if row.get("robot") else ""
+        cases.setdefault(f"{robot}compensator: {row.get('law')}", []).append(row)
+    return list(cases.items())
 
 
 def _by_severity(notes: Iterable[Mapping[str, Any]]) -> list[Mapping[str, Any]]:

@@ -110,9 +110,9 @@ def comparison(log: str = "run.mcap") -> dict[str, Any]:
             runs.append({"log": f"{r:.2f}{log}", "r": r, "start": start, **seen, "predicted": dict(seen)})
     runs[2]["verdict"] = "undecided"
     onset = [
-        {"start": 0.6, "gains": {"observer": 73.5}, "recorded": [0.9, 1.1], "predicted": 0.995,
+        {"start": 0.6, "gains": {"observer_gain": 73.5}, "recorded": [0.9, 1.1], "predicted": 0.995,
          "predicted_interval95": [0.99, 1.0], "ideal": 0.993, "symmetric": 1.0, "reversals": [1.15]},
-        {"start": -0.1, "gains": {"observer": 73.5}, "recorded": [None, 1.0], "predicted": None,
+        {"start": -0.1, "gains": {"observer_gain": 73.5}, "recorded": [None, 1.0], "predicted": None,
          "predicted_interval95": [], "ideal": None, "symmetric": 1.0, "reversals": [], "why": "no rest"},
     ]  # fmt: skip
     return {"runs": runs, "onset": onset, "agreement": {"verdicts": 1.0, "amplitude_rms": 0.004}}

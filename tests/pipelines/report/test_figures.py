@@ -164,6 +164,14 @@ class TestFigure10:
         assert sorted(predicted) == [0.993, 0.995]
         assert [float(np.ravel(m.get_xdata())[0]) for m in _marks(strip, "*")] == [1.15]
 
+    def test_gains_that_all_runs_share_stand_above(self) -> None:
+        comparison = examples.comparison()
+        assert any("L = 73.5 1/s" in label for label in _labels(svg_text(figure10(comparison))))
+        comparison["onset"][0]["gains"] = {"observer_gain": 40.0}
+        labels = _labels(svg_text(figure10(comparison)))
+        assert not any("L = 73.5 1/s" in label for label in labels)
+        assert any("observer_gain 40" in label for label in labels)
+
     def test_a_run_has_the_colour_of_the_start_that_it_belongs_to(self) -> None:
         comparison = examples.comparison()
         for k, run in enumerate(comparison["runs"]):

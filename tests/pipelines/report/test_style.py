@@ -1,3 +1,4 @@
+import functools
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -41,6 +42,11 @@ def _figure(number: int, *, title: str = "a title", simulated: bool = False) -> 
     )
 
 
+@functools.cache
+def _text(number: int, *, simulated: bool = False) -> str:
+    return svg_text(_figure(number, simulated=simulated))
+
+
 def _parsed(text: str) -> ElementTree.Element:
     return ElementTree.fromstring(text)  # noqa: S314  # written a moment ago by the tool itself
 
@@ -55,7 +61,7 @@ class TestEveryFigure:
         assert root.findtext(f"{_SVG}title") == "bench 3 < bench 4"
 
     def test_is_the_same_text_every_time_and_tells_no_date(self, number: int) -> None:
-        first, second = (svg_text(_figure(number)) for _ in range(2))
+        first, second = _text(number), svg_text(_figure(number))
         assert first == second
         assert "<metadata" not in first
         assert "<dc:" not in first
@@ -66,8 +72,8 @@ class TestEveryFigure:
         assert dict(mpl.rcParams) == before
 
     def test_says_when_it_is_simulated(self, number: int) -> None:
-        assert "SIMULATED" not in svg_text(_figure(number))
-        simulated = svg_text(_figure(number, simulated=True))
+        assert "SIMULATED" not in _text(number)
+        simulated = _text(number, simulated=True)
         assert "(SIMULATED)</title>" in simulated
         assert "<!-- SIMULATED -->" in simulated
 
@@ -83,13 +89,13 @@ class TestEveryFigure:
         known = {colour.light for colour in COLOURS.values()}
         found = {
             word
-            for word in svg_text(_figure(number)).replace(";", " ").replace('"', " ").split()
+            for word in _text(number).replace(";", " ").replace('"', " ").split()
             if word[0] == "#" and len(word) == 7
         }
         assert found <= known
 
     def test_fits_a_page_and_holds_letters_as_outlines(self, number: int) -> None:
-        text = svg_text(_figure(number))
+        text = _text(number)
         assert len(text) < 250_000
         assert "<text" not in text
         assert "<image" not in text
