@@ -43,6 +43,7 @@ REVERSAL: Final = 0  # surface x2 = 0
 MOTION: Final = 1  # surface v = 0
 REST_MARGIN: Final = 32 * 2.220446049250313e-16  # rounding of the torque balance
 NEWTON_LIMIT: Final = 100
+SLOWEST: Final = 1e-12  # [1/s] stands for an observer without gain or damping, whose estimate never settles
 
 
 @compiled
@@ -238,7 +239,7 @@ def mode_table(laws: FloatArray, inertia: FloatArray, gains: FloatArray, out: Fl
             k[SHAPE2], k[SHAPEV] = model[4], true[4]
             k[ALIKE] = 1.0 if alike else 0.0
         k = out[4 + forward2]
-        k[RATE] = damping + observer
+        k[RATE] = max(damping + observer, SLOWEST)
         k[GOAL] = -n1 / j_model / k[RATE]
         k[STIFF], k[DAMP] = n1, n2
         k[COULOMB], k[FADING] = r * model[1], r * rise_model

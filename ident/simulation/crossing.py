@@ -23,7 +23,7 @@ NEWTON_LIMIT = 60
 def first_crossing(polynomial: FloatArray, degree: int, sign: int, contact: int, work: FloatArray) -> float:
     """Smallest theta in (0, 1] where sign * polynomial falls to zero, inf where it does not.
 
-    `polynomial` (>= degree + 1,) ascending, its first `contact` coefficients taken as zero; `work` is as long.
+    `polynomial` (>= degree + 1,) ascending, its first `contact` coefficients zero; `work` is as long.
     """
     last = degree - contact
     rest = 0.0

@@ -1,0 +1,170 @@
+"""The return map of the closed loop on the section v = 0, and its derivative, as kernels.
+
+A point of the section is z = (x1, x2), with x3 = -x2: an instant at which the link comes to a halt. A
+*half turn* ends when it halts the next time, from whichever direction; a *turn* when it halts from v >
+0, where x1 is largest. Where robot and controller are symmetric, a half turn followed by a change of
+sign is a map of which the turn is the square.
+
+The derivative comes from deviations carried along the modes and across their surfaces
+(`orbits.saltation`). The estimate x2 passes through zero almost tangentially, with a jump of x3': the
+matrices are well defined, but differences of neighbouring trajectories lose many digits there.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from compensation.loop_modes import MOTION, SURFACE_ROWS, SYSTEM
+from compensation.loop_runs import begin, run_dormand_prince, run_series
+from compensation.loop_tangents import DEVIATIONS, STATES, TANGENTS, stick_deviations
+from compensation.orbits.saltation import carry, project_along, saltate
+from ident.simulation.compiled import compiled
+from ident.simulation.dormand_prince import DORMAND_PRINCE
+from ident.simulation.filippov_system import FloatArray, Signs
+from ident.simulation.integrate import SECTION, WORK_ROWS
+from ident.simulation.taylor import MAX_ORDER, TAYLOR
+
+EVENT_STORE: Final = 256  # of a half turn: chattering beyond that is reported as no return
+STEP_LIMIT: Final = 200_000
+
+
+@compiled
+def half_turn(
+    parameters: FloatArray,
+    analytic: bool,
+    tolerance: float,
+    patience: float,
+    state: FloatArray,
+    signs: Signs,
+    contact: Signs,
+) -> tuple[float, int]:
+    """To the next halt of the link, in place: (duration [s], reason), SECTION where there was one."""
+    none, none2 = np.empty(0), np.empty((0, STATES))
+    which, modes = np.empty(0, np.int64), np.empty((0, 2), np.int64)
+    if analytic:
+        end = run_series(
+            parameters, tolerance, patience, STEP_LIMIT, MOTION, 0, 1, 0.0, state, signs, contact,
+            none, none2, none, which, modes, none2,
+        )  # fmt: skip
+    else:
+        end = run_dormand_prince(
+            parameters, tolerance, patience, STEP_LIMIT, MOTION, 0, 1, 0.0, state, signs, contact,
+            none, none2, none, which, modes, none2,
+        )  # fmt: skip
+    return end.time, end.reason
+
+
+@compiled
+def returns(
+    parameters: FloatArray,
+    analytic: bool,
+    symmetric: bool,
+    tolerance: float,
+    patience: float,
+    start: FloatArray,
+    points: FloatArray,
+) -> tuple[int, int]:
+    """Follow the return map from `start` (3,) for as many returns as `points` has rows: (returns, reason).
+
+    A row (5,): x1, x2 of the return, its duration [s], lowest and highest x1 on the way. In the symmetric map
+    every row stands in the frame of its own half turn: the way is followed by a change of sign.
+    """
+    state = start.copy()
+    signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
+    begin(parameters, state, signs, contact)
+    for row in range(points.shape[0]):
+        duration = 0.0
+        low = high = state[0]
+        while True:
+            before = state[0]
+            span, reason = half_turn(
+                parameters, analytic, tolerance, patience - duration, state, signs, contact
+            )
+            duration += span
+            low, high = min(low, state[0]), max(high, state[0])
+            if reason != SECTION:
+                return row, reason
+            if symmetric or state[0] > before:
+                break
+        if symmetric:
+            for i in range(STATES):
+                state[i] = -state[i]
+            begin(parameters, state, signs, contact)
+        points[row, 0], points[row, 1] = state[0], state[1]
+        points[row, 2], points[row, 3], points[row, 4] = duration, low, high
+    return points.shape[0], SECTION
+
+
+@compiled
+def half_turn_derivative(
+    parameters: FloatArray,
+    analytic: bool,
+    tolerance: float,
+    patience: float,
+    state: FloatArray,
+    out: FloatArray,
+) -> int:
+    """Derivative (2, 2) of the half turn from the halt `state` (3,), which moves to the next halt; reason."""
+    signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
+    begin(parameters, state, signs, contact)
+    y = np.empty(STATES * (1 + DEVIATIONS))
+    y[:STATES] = state
+    y[STATES:] = 0.0
+    y[3], y[7], y[8] = 1.0, 1.0, -1.0  # deviations within the section: by x1, and by x2 = -x3
+    mode = signs.copy()
+    times, which = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64)
+    modes, states = np.empty((EVENT_STORE, 2), np.int64), np.empty((EVENT_STORE, STATES))
+    none, none2 = np.empty(0), np.empty((0, STATES))
+    if analytic:
+        end = run_series(
+            parameters, tolerance, patience, STEP_LIMIT, MOTION, 0, 1, 0.0, state, signs, contact,
+            none, none2, times, which, modes, states,
+        )  # fmt: skip
+    else:
+        end = run_dormand_prince(
+            parameters, tolerance, patience, STEP_LIMIT, MOTION, 0, 1, 0.0, state, signs, contact,
+            none, none2, times, which, modes, states,
+        )  # fmt: skip
+    if end.reason != SECTION:
+        return end.reason
+    polynomials = np.empty((y.size, MAX_ORDER + 1))
+    work = np.empty((WORK_ROWS, MAX_ORDER + 1))
+    deviations = y[STATES:].reshape(DEVIATIONS, STATES)
+    before, after = np.empty(STATES), np.empty(STATES)
+    now = 0.0
+    for event in range(end.events):
+        span = times[event] - now
+        if mode[MOTION] == 0:
+            stick_deviations(deviations, mode[0], parameters, span)
+        elif analytic:
+            carry(TAYLOR, TANGENTS, parameters, mode, y, span, tolerance, polynomials, work)
+        else:
+            carry(DORMAND_PRINCE, TANGENTS, parameters, mode, y, span, tolerance, polynomials, work)
+        y[:STATES] = states[event]
+        normal = SURFACE_ROWS[which[event], :STATES]
+        _rate(parameters, mode, states[event], before)
+        if event == end.events - 1:
+            project_along(deviations, before, normal)
+        elif mode[MOTION] != 0 or which[event] != MOTION:
+            _rate(parameters, modes[event], states[event], after)
+            saltate(deviations, before, after, normal)
+        mode[:] = modes[event]
+        now = times[event]
+    for i in range(DEVIATIONS):
+        out[0, i], out[1, i] = deviations[i, 0], deviations[i, 1]
+    return SECTION
+
+
+@compiled
+def _rate(parameters: FloatArray, mode: Signs, state: FloatArray, out: FloatArray) -> None:
+    """dx/dt (3,) in a slip mode or, the velocity held at zero, in a stick."""
+    if mode[MOTION] != 0:
+        SYSTEM.field(mode, state, parameters, out)
+        return
+    slipping = mode.copy()
+    slipping[MOTION] = slipping[0] if slipping[0] != 0 else 1
+    SYSTEM.field(slipping, state, parameters, out)
+    out[0] = 0.0
+    out[2] = -out[1]

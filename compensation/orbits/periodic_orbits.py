@@ -1,0 +1,172 @@
+"""Limit cycles as fixed points of a return map, with their Floquet multipliers.
+
+A return map takes a point of a section to the next one; a cycle of k returns is a fixed point of its
+k-th iterate. Where the map contracts strongly (friction forgets: most cycles of dry friction are
+superstable), following it finds the cycle to rounding within a few returns. Where it contracts slowly
+or not at all, Newton's method (shooting) on the fixed-point equation takes over, with the derivative
+that the map gives.
+
+Where the system is odd under a change of sign, the map may be that of a half turn followed by the
+change of sign. A cycle with an odd number of such returns is symmetric, and takes each of them twice.
+
+The Floquet multipliers are the eigenvalues of the derivative of the map over a period; the one that is
+always 1, along the cycle, is not among them. The cycle is stable where all lie inside the unit circle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+
+from ident.simulation.filippov_system import FloatArray
+
+MOST_TURNS: Final = 6  # returns a cycle may take
+PATIENCE: Final = 240  # returns to follow before giving up
+FIRST_LOOK: Final = 3
+LATER_LOOKS: Final = 24
+SAME: Final = 1e-11  # relative distance of points that are the same
+NEWTON_STEPS: Final = 12
+VANISHED: Final = 1e-9  # of the start: what has become as small decays
+NEAR: Final = 1e-3  # relative distance from which shooting is tried
+
+
+@dataclass(frozen=True)
+class Returns:
+    """A stretch of a return map: points and what happened on the way to each."""
+
+    points: FloatArray  # (k, d) coordinates on the section
+    durations: FloatArray  # (k,) [s]
+    lows: FloatArray  # (k,) least value of the watched coordinate on the way
+    highs: FloatArray  # (k,) greatest
+    end_reason: str  # "section reached" if all returns were made
+
+
+class ReturnMap(Protocol):
+    """What a system tells of its section."""
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether a return is a half turn followed by a change of sign."""
+
+    def follow(self, point: FloatArray, returns: int) -> Returns:
+        """The next `returns` returns after a point (d,) of the section."""
+
+    def derivative(self, point: FloatArray) -> FloatArray | None:
+        """Derivative (d, d) of one return, None where there is no return."""
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A limit cycle."""
+
+    point: FloatArray  # (d,) on the section
+    returns: int  # of the map, in a period or, of a symmetric cycle, in half of it
+    period: float  # [s]
+    x1_min: float  # least value of the watched coordinate
+    x1_max: float  # greatest
+    multipliers: tuple[complex, ...]  # the largest first
+    stable: bool
+
+    @property
+    def amplitude(self) -> float:
+        """max|x1| over a period."""
+        return max(abs(self.x1_min), abs(self.x1_max))
+
+
+@dataclass(frozen=True)
+class NoCycle:
+    """Why a search ended without a cycle."""
+
+    end_reason: str
+
+
+def find_cycle(section: ReturnMap, start: FloatArray) -> Cycle | NoCycle:
+    """The cycle that a point (d,) of the section leads to."""
+    done = section.follow(start, FIRST_LOOK)
+    points = done.points
+    while True:
+        if done.end_reason != "section reached":
+            return NoCycle(done.end_reason)
+        returns = _repeats(points, SAME)
+        if returns:
+            return cycle_at(section, points[-1], returns)
+        if float(np.max(np.abs(points[-1]))) <= VANISHED * float(np.max(np.abs(start))):
+            return NoCycle("decays to a point")
+        if points.shape[0] >= PATIENCE:
+            return NoCycle(f"no repetition within {points.shape[0]} returns")
+        returns = _repeats(points, NEAR)
+        if returns and points.shape[0] > FIRST_LOOK:
+            shot = shoot(section, points[-1], returns)
+            if isinstance(shot, Cycle) and shot.stable:
+                return shot
+        done = section.follow(points[-1], LATER_LOOKS)
+        points = np.concatenate([points, done.points])
+
+
+def shoot(section: ReturnMap, guess: FloatArray, returns: int) -> Cycle | NoCycle:
+    """Newton's method on the fixed-point equation of `returns` returns, from a guess (d,); stable or not."""
+    point = guess
+    for _ in range(NEWTON_STEPS):
+        done = section.follow(point, returns)
+        slope = _slope(section, point, returns)
+        if done.end_reason != "section reached" or slope is None:
+            return NoCycle(done.end_reason)
+        change = np.linalg.solve(np.eye(point.size) - slope, done.points[-1] - point)
+        point = point + change
+        if float(np.max(np.abs(change))) <= SAME * float(np.max(np.abs(point))):
+            return cycle_at(section, point, returns)
+    return NoCycle(f"shooting did not converge in {NEWTON_STEPS} steps")
+
+
+def cycle_at(section: ReturnMap, point: FloatArray, returns: int) -> Cycle | NoCycle:
+    """The cycle through a fixed point (d,) of the map's iterate."""
+    done = section.follow(point, returns)
+    slope = _slope(section, point, returns)
+    if done.end_reason != "section reached" or slope is None:
+        return NoCycle(done.end_reason)
+    period = float(np.sum(done.durations))
+    low, high = float(np.min(done.lows)), float(np.max(done.highs))
+    if section.symmetric:
+        sides = np.where(np.arange(returns) % 2 == 0, 1.0, -1.0)
+        ends = np.concatenate([sides * done.lows, sides * done.highs])
+        low, high = float(ends.min()), float(ends.max())
+        if returns % 2 == 1:
+            period, slope = 2.0 * period, slope @ slope
+            high = max(high, -low)
+            low = -high
+    multipliers = sorted((complex(value) for value in np.linalg.eigvals(slope)), key=abs, reverse=True)
+    return Cycle(
+        point=point,
+        returns=returns,
+        period=period,
+        x1_min=low,
+        x1_max=high,
+        multipliers=tuple(multipliers),
+        stable=abs(multipliers[0]) < 1.0,
+    )
+
+
+def _repeats(points: FloatArray, tolerance: float) -> int:
+    """How many returns until the last point comes back, 0 where it does not."""
+    if points.shape[0] < 2:
+        return 0
+    scale = float(np.max(np.abs(points[-1])))
+    for returns in range(1, min(MOST_TURNS, points.shape[0] - 1) + 1):
+        if float(np.max(np.abs(points[-1] - points[-1 - returns]))) <= tolerance * scale:
+            return returns
+    return 0
+
+
+def _slope(section: ReturnMap, point: FloatArray, returns: int) -> FloatArray | None:
+    slope = np.eye(point.size)
+    at = point
+    for index in range(returns):
+        once = section.derivative(at)
+        if once is None:
+            return None
+        slope = once @ slope
+        if index + 1 < returns:
+            at = section.follow(at, 1).points[-1]
+    return slope
