@@ -159,7 +159,9 @@ def unwrap(run: Signals, resolution: float | None) -> tuple[Signals, tuple[Findi
     typical = float(np.median(np.abs(steps)))
     largest = float(np.max(np.abs(steps)))
     for modulus in _moduli(resolution, largest):
-        jumps = np.flatnonzero(np.abs(np.abs(steps) - modulus) < 0.02 * modulus)
+        sizes = np.abs(steps)
+        alone = np.maximum(np.roll(sizes, 1), np.roll(sizes, -1)) < 0.5 * modulus  # or it is a fast motion
+        jumps = np.flatnonzero((np.abs(sizes - modulus) < 0.02 * modulus) & alone)
         if not jumps.size or typical > 0.05 * modulus or jumps.size > 0.02 * steps.size + 4:
             continue
         mended = steps.copy()

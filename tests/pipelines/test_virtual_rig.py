@@ -200,6 +200,17 @@ def test_awkward_names_units_and_axes_read_back_as_meant(tmp_path: Path) -> None
     assert np.abs(forward.reference - forward.position).max() < 1e-4
 
 
+def test_a_fast_link_on_a_fine_encoder_is_read_without_findings(tmp_path: Path) -> None:
+    text = AWKWARD.replace('"excitation"\nlogs = ["e/*.csv"]', '"breakaway"\nlogs = ["b/*.csv"]')
+    campaign = campaign_in(tmp_path, text.replace("speeds =", "ramps = 2\nspeeds ="))
+    record(campaign, tmp_path)
+    runs = [run for log, run in recordings(campaign).items() if log.startswith("b/")]
+    assert len(runs) == 4
+    # over 2^10 counts a sample: as large as a counter's overflow could be
+    assert max(np.abs(np.diff(run.position)).max() for run in runs) > 1.02e-3
+    assert all(run.findings == () for run in runs)
+
+
 def test_the_same_seed_writes_the_same_bytes(tmp_path: Path) -> None:
     text = AWKWARD + "\n"
     seeds = [text, text, text.replace("[virtual_rig]\n", "[virtual_rig]\nseed = 2\n")]
