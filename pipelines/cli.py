@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,7 +20,7 @@ import typer
 from pipelines import command_options as option
 from pipelines import printed_answers as printed
 from pipelines.exit_status import Status
-from pipelines.refusals import ends_well
+from pipelines.refusals import ends_well, say
 
 if TYPE_CHECKING:
     from pipelines.gains import GainOptions
@@ -55,11 +56,12 @@ def demo(
     from pipelines.virtual_rig import record as record_on
     from pipelines.whole_run import RunOptions, run_campaign
 
-    place = out or OUTPUTS / "demo"
-    folder = open_results(place, Owner(place.resolve().name, "virtual one-link robot"), force=force)
+    place, text = out or OUTPUTS / "demo", demo_campaign_text(quick)
+    owner = Owner(place.resolve().name, tomllib.loads(text)["rig"]["name"])
+    folder = open_results(place, owner, force=force)
     path = place / "campaign" / "campaign.toml"
     folder.claim()
-    write_atomically(path, demo_campaign_text(quick).encode())
+    write_atomically(path, text)
     with shown_progress(quiet=quiet) as progress:
         record_on(load_campaign(path, logs_exist=False), path.parent, told(progress, "recording"))
         campaign = load_campaign(path)
@@ -100,9 +102,27 @@ def inspect(
     as_json: option.Json = False,
 ) -> Status:
     """What a log holds, with no settings at all: channels, units, rate, clock, gaps, integrity."""
-    from pipelines.inspect import inspect_logs
+    from data.findings import LogError
+    from pipelines.inspect import MANY, inspect_log, to_plain
+    from pipelines.inspection_text import print_inspection
 
-    return inspect_logs(logs, as_json=as_json)
+    found, status = [], Status.DONE
+    for log in logs:
+        try:
+            inspection = inspect_log(log)
+        except LogError as failure:
+            say(str(failure))
+            status = Status.REFUSED
+            continue
+        if status is Status.DONE:
+            status = inspection.status
+        found.append(to_plain(inspection))
+        if not as_json:
+            print_inspection(inspection)
+    if as_json and found:
+        document = found[0] if len(logs) == 1 else {"schema": MANY, "logs": found}
+        print(json.dumps(document, indent=2, allow_nan=False))
+    return status
 
 
 @app.command()

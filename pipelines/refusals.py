@@ -33,7 +33,7 @@ def ends_well(command: Callable[P, Status]) -> Callable[P, None]:
         except typer.Exit:
             raise
         except KeyboardInterrupt:
-            _say("interrupted; every file that stands under its final name is whole")
+            say("interrupted; every file that stands under its final name is whole")
             status = INTERRUPTED
         except Exception as failure:
             status = _refused(failure)
@@ -45,18 +45,18 @@ def ends_well(command: Callable[P, Status]) -> Callable[P, None]:
 def _refused(failure: Exception) -> int:
     """Say what was wrong, and the exit code of it."""
     if isinstance(failure, UsageError):
-        _say(str(failure))
+        say(str(failure))
         return Status.USAGE
     if isinstance(failure, RefusalError) or _is_of_the_rooms_below(failure):
-        _say(str(failure))
+        say(str(failure))
         return Status.REFUSED
     if isinstance(failure, OSError) and failure.strerror:
         where = f"{failure.filename}: " if failure.filename else ""
-        _say(f"{where}{failure.strerror}")
+        say(f"{where}{failure.strerror}")
         return Status.REFUSED
     if os.environ.get(DEBUG):
         traceback.print_exception(failure)
-    _say(
+    say(
         f"this should not have happened: {type(failure).__name__}: {failure}. Please report it, with the "
         f"output of the same command under {DEBUG}=1"
     )
@@ -71,7 +71,7 @@ def _is_of_the_rooms_below(failure: Exception) -> bool:
     return isinstance(failure, (LogError, ModelError))
 
 
-def _say(message: str) -> None:
+def say(message: str) -> None:
     """One message on stderr, with what could steer a terminal taken out of it."""
     shown = "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in message)
     encoding = sys.stderr.encoding or "utf-8"
