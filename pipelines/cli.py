@@ -20,7 +20,7 @@ import typer
 from pipelines import command_options as option
 from pipelines import printed_answers as printed
 from pipelines.exit_status import Status
-from pipelines.refusals import ends_well, say
+from pipelines.refusals import ends_well
 
 if TYPE_CHECKING:
     from pipelines.gains import GainOptions
@@ -102,27 +102,9 @@ def inspect(
     as_json: option.Json = False,
 ) -> Status:
     """What a log holds, with no settings at all: channels, units, rate, clock, gaps, integrity."""
-    from data.findings import LogError
-    from pipelines.inspect import MANY, inspect_log, to_plain
-    from pipelines.inspection_text import print_inspection
+    from pipelines.inspect import inspect_logs
 
-    found, status = [], Status.DONE
-    for log in logs:
-        try:
-            inspection = inspect_log(log)
-        except LogError as failure:
-            say(str(failure))
-            status = Status.REFUSED
-            continue
-        if status is Status.DONE:
-            status = inspection.status
-        found.append(to_plain(inspection))
-        if not as_json:
-            print_inspection(inspection)
-    if as_json and found:
-        document = found[0] if len(logs) == 1 else {"schema": MANY, "logs": found}
-        print(json.dumps(document, indent=2, allow_nan=False))
-    return status
+    return inspect_logs(logs, as_json=as_json)
 
 
 @app.command()

@@ -33,7 +33,7 @@ def ends_well(command: Callable[P, Status]) -> Callable[P, None]:
         except typer.Exit:
             raise
         except KeyboardInterrupt:
-            say("interrupted; every file that stands under its final name is whole")
+            _say("interrupted; every file that stands under its final name is whole")
             status = INTERRUPTED
         except Exception as failure:
             status = _refused(failure)
@@ -45,18 +45,18 @@ def ends_well(command: Callable[P, Status]) -> Callable[P, None]:
 def _refused(failure: Exception) -> int:
     """Say what was wrong, and the exit code of it."""
     if isinstance(failure, UsageError):
-        say(str(failure))
+        _say(str(failure))
         return Status.USAGE
     if isinstance(failure, RefusalError) or _is_of_the_rooms_below(failure):
-        say(str(failure))
+        _say(str(failure))
         return Status.REFUSED
     if isinstance(failure, OSError) and failure.strerror:
         where = f"{failure.filename}: " if failure.filename else ""
-        say(f"{where}{failure.strerror}")
+        _say(f"{where}{failure.strerror}")
         return Status.REFUSED
     if os.environ.get(DEBUG):
         traceback.print_exception(failure)
-    say(
+    _say(
         f"this should not have happened: {type(failure).__name__}: {failure}. Please report it, with the "
         f"output of the same command under {DEBUG}=1"
     )
@@ -71,7 +71,7 @@ def _is_of_the_rooms_below(failure: Exception) -> bool:
     return isinstance(failure, (LogError, ModelError))
 
 
-def say(message: str) -> None:
+def _say(message: str) -> None:
     """One message on stderr, with what could steer a terminal taken out of it."""
     shown = "".join(c if c.isprintable() or c == "\n" else "\N{REPLACEMENT CHARACTER}" for c in message)
     encoding = sys.stderr.encoding or "utf-8"
