@@ -49,7 +49,7 @@ from pipelines.design_quantities import (
     threshold_ends,
     threshold_values,
 )
-from pipelines.equilibrium_sweeps import FIGURE_8_GAINS, edges, extrema, observer_gain_axis
+from pipelines.equilibrium_sweeps import FIGURE_8_GAINS, edges, extrema, observer_gain_axis, with_folds
 from pipelines.loop_settings import LawChoice
 from pipelines.results import ResultFolder
 from pipelines.robot_file import RobotFile
@@ -153,7 +153,9 @@ def write_design(result: Design, folder: ResultFolder) -> None:
 
     gains, moving, model = result.gains, result.moving, result.model
     limit = critical_observer_gains(moving).worst
-    swept = observer_gain_axis(limit, gains.observer)
+    swept = with_folds(
+        observer_gain_axis(limit, gains.observer), moving, model, gains, compensation_gains=FIGURE_8_GAINS
+    )
     critical = limit if math.isfinite(limit) and limit > 0 else None
     subtitle = f"{result.name}: n1 = {gains.proportional:g}, n2 = {gains.derivative:g}; {_loop_words(result)}"
     exact, none = (

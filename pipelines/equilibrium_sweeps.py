@@ -3,24 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from compensation.controller import Controller, Gains
-from compensation.equilibria import EquilibriumSet, equilibrium_sets
+from compensation.equilibria import EquilibriumSet, equilibrium_set, equilibrium_sets
 from data.recording import FloatArray
 from ident.model.robot import OneLinkRobot
 from pipelines.results import ResultFolder
 
 FIGURE_8_GAINS: Final = (0.9, 0.95, 0.99, 1.0, 1.005, 1.01, 1.02)  # r; the paper does not print its own
 _POINTS: Final = 481
+_NEAR_FOLD: Final = (0.0, 1e-5, 1e-4, 5e-4, 1e-3, 2e-3)  # relative distances below the end of a set
 
 
 def observer_gain_axis(*marks: float) -> FloatArray:
     """Observer gains (n,) [1/s] from near 0 to well past every finite one of `marks`."""
     end = 1.4 * max((mark for mark in marks if np.isfinite(mark) and mark > 0), default=100.0)
     return np.linspace(end / (_POINTS - 1), end, _POINTS)
+
+
+def with_folds(
+    observer_gain: FloatArray,
+    robot: OneLinkRobot,
+    model: OneLinkRobot,
+    gains: Gains,
+    *,
+    compensation_gains: Sequence[float],
+) -> FloatArray:
+    """The axis (n,) [1/s] with more points where, for one of the r, the equilibria end: edges meet there."""
+    ends = [
+        _fold(observer_gain, robot, model, gains, r)
+        for r in compensation_gains
+        if r > 0.0  # without compensation the set never ends
+    ]
+    near = [end * (1.0 - distance) for end in ends if end is not None for distance in _NEAR_FOLD]
+    return np.union1d(observer_gain, near)
 
 
 def extrema(
@@ -75,10 +95,28 @@ def write_edges(
 def _sets(
     robot: OneLinkRobot, model: OneLinkRobot, gains: Gains, *, r: float, observer_gain: FloatArray
 ) -> tuple[EquilibriumSet, ...]:
-    controller = Controller(
-        Gains(gains.proportional, gains.derivative, observer=gains.observer, compensation=r), model
-    )
+    controller = Controller(replace(gains, compensation=r), model)
     return equilibrium_sets(robot, controller, parameter="L", values=observer_gain)
+
+
+def _fold(
+    observer_gain: FloatArray, robot: OneLinkRobot, model: OneLinkRobot, gains: Gains, r: float
+) -> float | None:
+    """The largest L [1/s] on the axis with rests beside the set point, to rounding; None: all or none."""
+
+    def rests(L: float) -> bool:
+        controller = Controller(replace(gains, compensation=r, observer=L), model)
+        return not equilibrium_set(robot, controller).is_single_point
+
+    some = np.array([rests(float(L)) for L in observer_gain])
+    if some.all() or not some.any() or some[-1]:
+        return None
+    last = int(np.flatnonzero(some)[-1])
+    low, high = float(observer_gain[last]), float(observer_gain[last + 1])
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if rests(middle) else (low, middle)
+    return low
 
 
 def _farthest(found: EquilibriumSet) -> tuple[float, float]:
