@@ -39,6 +39,8 @@ from ident.slip_series import (
 )
 
 _MOST_STEPS: Final = 100_000  # far above what any law needs: a loop that cannot end is worse than a NaN
+_NEAR: Final = 10.0  # so many periods from rest the series takes a period in its stride
+_AT_REST: Final = 1e-150  # [rad/s]: a speed that only fades (u = F_s, beta > 1) is 0 before it underflows
 _EARLY: Final = 1e-9  # where beta is not 1, a ramp's series starts at this part of the shortest delay
 
 
@@ -95,7 +97,8 @@ def advance(
         curve = law[1:6] if sign > 0.0 else law[6:11]
         speed, excess = abs(velocity), sign * torque - curve[0]
         plain = curve[4] == 1.0 or curve[0] == curve[1]
-        if not plain and speed < speed_limit(excess, curve):
+        near = speed * inertia < _NEAR * left * abs(excess)
+        if near and not plain and speed < speed_limit(excess, curve):
             speed, distance, used = slip_near_rest(speed, excess, left, inertia, curve)
         else:
             order, used = expand(speed, (excess, 0.0), left, (inertia, curve), series)
@@ -103,11 +106,12 @@ def advance(
             speed = speed_at(series, order, 1.0)
             if speed <= 0.0:
                 part = part_at_rest(series, order)
+            if speed < _AT_REST:
                 speed = 0.0
             distance = distance_at(series, order, part, used)
             used *= part
         position += sign * distance
-        velocity = sign * speed if speed > 0.0 else 0.0
+        velocity = sign * speed if speed > 0.0 else 0.0  # no -0.0
         left -= used
         if left <= 0.0:
             return position, velocity

@@ -78,8 +78,10 @@ def expand(
         if k == 2:
             rate += ramp * step
         s[k] = step * rate / (inertia * k)
-        if k == 1 and (s[1] < 0.0 or (power[0] < _FELT and not plain)):
-            change = _largest_change(speed, power[0], 1.0 if plain else shape)
+        if k == 1:
+            change = 1e3 * (speed + scale) if plain else 4.0 * speed  # far beyond the series' radius
+            if s[1] < 0.0 or (power[0] < _FELT and not plain):
+                change = min(change, _largest_change(speed, power[0], 1.0 if plain else shape))
             if abs(s[1]) > change:
                 shorter = change / abs(s[1])
                 step *= shorter

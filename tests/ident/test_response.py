@@ -168,6 +168,41 @@ def test_without_a_stribeck_effect_the_speed_is_an_exponential() -> None:
     np.testing.assert_allclose(position, final * (time - 0.2 * fading), rtol=1e-11, atol=1e-15)
 
 
+@pytest.mark.parametrize(
+    ("robot", "velocity", "torque", "period"),
+    [
+        # breaks away with an excess of a rounding error, where the slope at rest is infinite
+        (with_shape(0.3), 0.0, 0.57 * (1 + 1e-12), 0.05),
+        # fades to rest without reaching it, thousands of time constants in one period
+        (
+            OneLinkRobot(1e-5, StribeckFriction.symmetric(StribeckCurve(0.04, 0.01, 0.01, 20.0, 2.7))),
+            50.0,
+            0.04,
+            0.003,
+        ),
+        # falls from a million v_s
+        (
+            OneLinkRobot(1e-2, StribeckFriction.symmetric(StribeckCurve(0.5, 0.1, 1e-5, 0.0, 1.0))),
+            10.0,
+            -2.0,
+            0.05,
+        ),
+        # moves so steadily that its distance from rest says nothing of a period's
+        (
+            OneLinkRobot(40.0, StribeckFriction.symmetric(StribeckCurve(0.25, 0.24, 2e-5, 0.0, 4.0))),
+            0.5,
+            -0.25,
+            6e-6,
+        ),
+    ],
+)
+def test_extremes_are_as_exact(robot: OneLinkRobot, velocity: float, torque: float, period: float) -> None:
+    law, state = law_array(robot), (0.0, velocity)
+    for _ in range(32):
+        state = advance(*state, torque, period / 32, law)
+    assert advance(0.0, velocity, torque, period, law) == pytest.approx(state, rel=1e-10, abs=1e-30)
+
+
 def test_the_ripple_is_a_torque_at_the_sample_s_position() -> None:
     plant = plant_array(TABLE_1, TorqueRipple(amplitude=0.2, harmonic=7.0, phase=0.3))
     added = 0.2 * math.sin(7.0 * 0.4 + 0.3)
