@@ -28,7 +28,7 @@ from pipelines.exit_status import Status, UsageError
 from pipelines.gains import GainOptions, chosen_gains, chosen_sampling, with_exact
 from pipelines.identify import identify, left_out, write_identification
 from pipelines.loop_settings import LawChoice
-from pipelines.manifest import Command, write_manifest
+from pipelines.manifest import Command, versions, write_manifest
 from pipelines.motion_figures import write_motion_figures
 from pipelines.predict import Sweep, one_sweep
 from pipelines.progress import Progress
@@ -264,7 +264,9 @@ def write_report(
         rig=campaign.rig.name,
         robot=document("robot.json"),
         design=document("design.json"),
+        diagram=document("diagram.json"),
         comparison=document("comparison.json"),
+        manifest={"versions": versions(), "files": folder.written},
         truth=truth,
         fit_report=(folder.path / "fit_report.txt").read_text(encoding="utf-8"),
         figures=pictures,

@@ -23,6 +23,7 @@ from pipelines.report.style import BLUE, INK, MUTED, VERMILLION, new_figure, sty
 _PARAMETER: Final = {"r": "compensation gain $r$", "L": "observer gain $L$ [1/s]"}
 _ROMAN: Final = {"limit_cycle": "(I)", "equilibrium_set": "(II)", "equilibrium": "(III)"}
 _SET_OPACITY: Final = 0.25
+_DOTTED: Final = (0, (1.5, 2))
 
 
 @styled
@@ -41,14 +42,14 @@ def figure9(
     named: set[str] = set()
     for branch in sorted(diagram.branches, key=lambda branch: -len(branch.points)):
         draw_branch(axes, branch, cycle=VERMILLION, rest=BLUE)
-        if branch.kind not in named:
+        if branch.kind not in named and len(branch.points) > 1:
             _name(axes, branch)
             named.add(branch.kind)
-    for number, bifurcation in enumerate(diagram.bifurcations):
-        axes.axvline(bifurcation.value, color=INK, linewidth=0.9, linestyle=(0, (1.5, 2)), zorder=2.5)
+    values = {f"{diagram.parameter} = {change.value:.4g}": change.value for change in diagram.bifurcations}
+    for number, name in enumerate(values):
+        axes.axvline(values[name], color=INK, linewidth=0.9, linestyle=_DOTTED, zorder=2.5)
         axes.annotate(
-            f"{bifurcation.kind.replace('_', ' ')}\n{diagram.parameter} = {bifurcation.value:.4g}",
-            (bifurcation.value, 1.0), (-4, -2 - 24 * number), xycoords=("data", "axes fraction"),
+            name, (values[name], 1.0), (-4, -2 - 11 * (number % 3)), xycoords=("data", "axes fraction"),
             textcoords="offset points", ha="right", va="top", fontsize=8.0, color=MUTED, parse_math=False,
         )  # fmt: skip
     unit = units_of(axis).position
@@ -57,7 +58,8 @@ def figure9(
         ylabel=f"$x_1$ at rest, $\\max|x_1|$ of a cycle [{unit}]",
     )
     axes.margins(x=0.0)
-    figure.legend(handles=_legend(diagram.branches), loc="outside lower center", ncols=4)
+    handles = _legend(diagram)
+    figure.legend(handles=handles, loc="outside lower center", ncols=len(handles) if len(handles) < 4 else 3)
     return figure
 
 
@@ -72,7 +74,10 @@ def draw_branch(axes: Axes, branch: DrawnBranch, *, cycle: str, rest: str) -> No
         for edge in (low, high):
             axes.plot(value, edge, color=rest, linestyle=dashes, linewidth=1.2, zorder=2.6)
     else:
-        axes.plot(value, 0.5 * (low + high), color=INK, linestyle=dashes, linewidth=1.4, zorder=3)
+        middle = 0.5 * (low + high)
+        axes.plot(value, middle, color=INK, linestyle=dashes, linewidth=1.4, zorder=3)
+        if value.size == 1:  # a set that has shrunk to a point at this one value
+            axes.plot(value, middle, marker="o", markersize=4, color=INK, zorder=3)
 
 
 def branch_arrays(points: Sequence[BranchPoint]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -84,25 +89,23 @@ def branch_arrays(points: Sequence[BranchPoint]) -> tuple[FloatArray, FloatArray
 
 
 def _name(axes: Axes, branch: DrawnBranch) -> None:
+    """The branch's roman number, above a line or inside the wider half of a set."""
     value, low, high, amplitude = branch_arrays(branch.points)
     if not value.size:
         return
-    middle = value.size // 2
-    heights = {"limit_cycle": amplitude, "equilibrium_set": 0.5 * (low + high), "equilibrium": high}
-    offsets = {"limit_cycle": (-6, 8), "equilibrium_set": (0, 10), "equilibrium": (0, 10)}
-    if branch.kind == "equilibrium_set":
-        middle = value.size // 3
+    at = value.size // 3 if branch.kind == "equilibrium_set" else value.size // 2
+    wider = low if abs(low[at]) >= abs(high[at]) else high
+    heights = {"limit_cycle": amplitude, "equilibrium_set": 0.5 * wider}
+    offsets = {"limit_cycle": (-6, 8), "equilibrium_set": (0, 0)}
     axes.annotate(
-        _ROMAN.get(branch.kind, ""),
-        (value[middle], heights.get(branch.kind, high)[middle]),
-        offsets.get(branch.kind, (0, 8)),
-        textcoords="offset points",
-        ha="center", va="center", fontweight="bold", zorder=5,
+        _ROMAN.get(branch.kind, ""), (value[at], heights.get(branch.kind, high)[at]),
+        offsets.get(branch.kind, (0, 10)), textcoords="offset points", ha="center", va="center",
+        fontweight="bold", zorder=5,
     )  # fmt: skip
 
 
-def _legend(branches: Sequence[DrawnBranch]) -> list[Line2D | Patch]:
-    kinds = {(branch.kind, branch.stable) for branch in branches}
+def _legend(diagram: DrawnDiagram) -> list[Line2D | Patch]:
+    kinds = {(branch.kind, branch.stable) for branch in diagram.branches if len(branch.points) > 1}
     handles: list[Line2D | Patch] = []
     if ("limit_cycle", True) in kinds:
         handles.append(
@@ -116,4 +119,6 @@ def _legend(branches: Sequence[DrawnBranch]) -> list[Line2D | Patch]:
         handles.append(Line2D([], [], color=INK, linestyle="--", label="(III) unstable equilibrium point"))
     if ("equilibrium", True) in kinds:
         handles.append(Line2D([], [], color=INK, label="stable equilibrium point"))
+    if diagram.bifurcations:
+        handles.append(Line2D([], [], color=INK, linestyle=_DOTTED, linewidth=0.9, label="bifurcation"))
     return handles

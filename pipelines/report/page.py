@@ -31,6 +31,7 @@ def report_page(
     rig: str = "",
     robot: Mapping[str, Any] | None = None,
     design: Mapping[str, Any] | None = None,
+    diagram: Mapping[str, Any] | None = None,
     comparison: Mapping[str, Any] | None = None,
     manifest: Mapping[str, Any] | None = None,
     truth: Mapping[str, Any] | None = None,
@@ -41,8 +42,9 @@ def report_page(
 ) -> str:
     """The page as HTML text.
 
-    `robot`, `design`, `comparison`, `manifest` and `truth` as their JSON files hold them; `figures` maps
-    "figure2" ... "figure10" to SVG text. Raises `PictureError` for a picture that this tool cannot have made.
+    `robot`, `design`, `diagram`, `comparison`, `manifest` and `truth` as their JSON files hold them;
+    `figures` maps "figure2" ... "figure10" to SVG text. Raises `PictureError` for a picture that this tool
+    cannot have made.
     """
     units = units_of(axis)
     entries = table1_entries(robot, truth=truth) if robot else ()
@@ -62,6 +64,7 @@ def report_page(
         notes=_by_severity((robot or {}).get("notes") or ()),
         design=design,
         certificates=_by_case((design or {}).get("certificates") or ()),
+        diagram=diagram,
         comparison=comparison,
         figures=pictures,
         fit_report=_printable_lines(fit_report[:_LONGEST_REPORT]) if fit_report else None,

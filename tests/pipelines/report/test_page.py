@@ -71,6 +71,11 @@ def _everything(**changes: Any) -> str:
         "rig": "one-link robot",
         "robot": examples.robot(),
         "design": examples.design(),
+        "diagram": {
+            "parameter": "r",
+            "bifurcations": [{"r": 0.9925, "kind": "onset_of_cycling"}],
+            "notes": ["n"],
+        },
         "comparison": examples.comparison(),
         "manifest": {"versions": {"numpy": "2.4.6"}, "seed": 1, "inputs": [{"file": "a", "sha256": "b"}]},
         "fit_report": "[[Variables]]\n    F_s: 0.57 +/- 0.01",
@@ -125,6 +130,11 @@ class TestThePage:
     def test_withheld_parameters_show_the_reason(self) -> None:
         assert "E-LOWSPEED: run 0.01 to 0.05 rad/s" in "".join(_walk(_everything()).text)
 
+    def test_the_bifurcations_are_named(self) -> None:
+        text = "".join(_walk(_everything()).text)
+        assert "0.9925" in text
+        assert "onset of cycling" in text
+
     def test_is_the_same_every_time(self) -> None:
         assert _everything() == _everything()
 
@@ -148,7 +158,9 @@ class TestSimulated:
         assert "SIMULATED" not in _everything()
 
 
-@pytest.mark.parametrize("part", ["robot", "design", "comparison", "manifest", "fit_report", "figures"])
+@pytest.mark.parametrize(
+    "part", ["robot", "design", "diagram", "comparison", "manifest", "fit_report", "figures"]
+)
 def test_every_part_is_optional(part: str) -> None:
     _walk(_everything(**{part: None}))
 
