@@ -4,6 +4,7 @@ The continuous loop's branches can be continued, see `bifurcation`. The loop as 
 period and encoder counts, is a discrete map with rounding: its cycles are found by running it. At every value
 of the parameter it runs from two starts, far out on either side, long enough to settle; what the position
 does at the end is judged as a recording would be (`orbits.steady_state`). The larger cycle of the two counts.
+Where neighbouring values end up differently the onset between them is bisected.
 
 Its rests: between samples nothing distinguishes a sampled from a continuous controller once the link and the
 estimate are still, so the equilibrium sets are those of the continuous loop, up to a count.
@@ -29,6 +30,7 @@ FloatArray = NDArray[np.float64]
 _TURNS: Final = 40.0  # of the undamped loop, 2 pi sqrt(J/n1), that a run lasts
 _START: Final = 1.2  # of F_s/n1, the largest rest error without compensation
 _BATCH: Final = 8  # runs that are held in memory at a time
+_BISECTIONS: Final = 7  # of the interval of the sweep that an onset lies in
 _ONSET: Final = "onset of limit cycling (sampled)"
 
 
@@ -57,10 +59,8 @@ def sampled_cycles(
     duration = settling_time(robot, controller)
     far = _START * max(_static(robot)) / controller.gains.proportional
     starts = (far, -far)
-    points: list[Point | None] = []
-    undecided: list[float] = []
-    for first in range(0, len(values), _BATCH):
-        batch = values[first : first + _BATCH]
+
+    def ends(batch: Sequence[float]) -> list[Point | str]:
         controllers = [with_gain(controller, parameter, value) for value in batch for _ in starts]
         positions = run_many(
             [robot],
@@ -70,18 +70,21 @@ def sampled_cycles(
             duration=duration,
             map=map,
         )
-        for k, value in enumerate(batch):
-            found = [_judged(value, run, sampling) for run in positions[2 * k : 2 * k + 2]]
-            cycles = [point for point in found if isinstance(point, Point)]
-            points.append(max(cycles, key=lambda point: point.amplitude, default=None))
-            if not cycles and "undecided" in found:
-                undecided.append(value)
+        return [
+            _larger([_judged(value, run, sampling) for run in positions[2 * k : 2 * k + 2]])
+            for k, value in enumerate(batch)
+        ]
+
+    found: list[Point | str] = []
+    for first in range(0, len(values), _BATCH):
+        batch = values[first : first + _BATCH]
+        found += ends(batch)
         if tick is not None:
             tick(len(batch))
     return SampledCycles(
-        branches=_branches(points),
-        onsets=_onsets(values, points),
-        undecided=tuple(undecided),
+        branches=_branches(found),
+        onsets=_onsets(values, found, ends),
+        undecided=tuple(value for value, end in zip(values, found, strict=True) if end == "undecided"),
         duration=duration,
         starts=starts,
     )
@@ -124,21 +127,39 @@ def _judged(value: float, position: FloatArray, sampling: Sampling) -> Point | s
     )
 
 
-def _branches(points: Sequence[Point | None]) -> tuple[Branch, ...]:
+def _larger(found: Sequence[Point | str]) -> Point | str:
+    """The larger cycle of a value's runs; without one, "undecided" if any run is."""
+    cycles = [point for point in found if isinstance(point, Point)]
+    if cycles:
+        return max(cycles, key=lambda point: point.amplitude)
+    return "undecided" if "undecided" in found else "equilibrium"
+
+
+def _branches(points: Sequence[Point | str]) -> tuple[Branch, ...]:
     """Neighbouring cycles joined; a value without a cycle parts two branches."""
     runs: list[list[Point]] = [[]]
     for point in points:
-        if point is not None:
+        if isinstance(point, Point):
             runs[-1].append(point)
         elif runs[-1]:
             runs.append([])
     return tuple(Branch(kind="limit_cycle", stable=True, points=tuple(run)) for run in runs if run)
 
 
-def _onsets(values: Sequence[float], points: Sequence[Point | None]) -> tuple[Bifurcation, ...]:
-    """Halfway between a value that rests and the next that cycles, or the other way."""
-    return tuple(
-        Bifurcation(value=0.5 * (values[k - 1] + values[k]), kind=_ONSET)
-        for k in range(1, len(points))
-        if (points[k] is None) != (points[k - 1] is None)
-    )
+def _onsets(
+    values: Sequence[float],
+    found: Sequence[Point | str],
+    ends: Callable[[Sequence[float]], list[Point | str]],
+) -> tuple[Bifurcation, ...]:
+    """Where rest turns into a cycle or back, by bisection between neighbouring values."""
+    onsets = []
+    for k in range(1, len(found)):
+        before = isinstance(found[k - 1], Point)
+        if isinstance(found[k], Point) == before:
+            continue
+        low, high = values[k - 1], values[k]
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if isinstance(ends([middle])[0], Point) == before else (low, middle)
+        onsets.append(Bifurcation(value=0.5 * (low + high), kind=_ONSET))
+    return tuple(onsets)

@@ -35,7 +35,8 @@ def test_the_asymmetric_rig_cycles_from_just_below_one() -> None:
     (branch,) = found.branches
     assert [point.value for point in branch.points] == [1.01, 1.1]
     assert branch.points[1].amplitude == pytest.approx(0.391, abs=0.02)
-    assert [onset.value for onset in found.onsets] == [0.995]
+    (onset,) = found.onsets
+    assert 0.985 < onset.value < 1.005
     assert sum(done) == 4
     for point in branch.points:
         assert point.amplitude == pytest.approx(max(-point.x1_min, point.x1_max), abs=2e-3)

@@ -105,7 +105,8 @@ def test_counts_move_the_onset_of_the_sampled_loop() -> None:
     (branch,) = [b for b in result.diagram.branches if b.kind == "limit_cycle"]
     assert [round(p.value, 9) for p in branch.points] == [1.025, 1.05, 1.075, 1.1]
     assert branch.points[-1].amplitude == pytest.approx(0.35, abs=0.04)  # a tenth to a fifth below 0.391
-    assert [round(one.value, 6) for one in result.diagram.bifurcations] == [1.0125]
+    (onset,) = result.diagram.bifurcations
+    assert 1.004 < onset.value < 1.011
     assert "counts" in result.loop
     assert "64.08 s" in result.notes[0]
 
