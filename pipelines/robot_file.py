@@ -193,12 +193,7 @@ def _identified(document: RobotDocument, path: Path) -> IdentifiedRobot:
     matrix = np.zeros((0, 0))
     if document.covariance is not None:
         names = document.covariance.names
-        try:
-            matrix = np.asarray(document.covariance.matrix, dtype=np.float64).reshape(len(names), len(names))
-        except ValueError:
-            raise RobotFileError(
-                f"{path}: covariance.matrix: {len(names)} names need as many rows of as many numbers"
-            ) from None
+        matrix = np.array(document.covariance.matrix, dtype=np.float64).reshape(len(names), len(names))
     return IdentifiedRobot(
         inertia=_estimate(document.inertia),
         positive=positive,

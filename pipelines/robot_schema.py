@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Final, Literal, Self
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from data.findings import Severity
 from data.protocols import ProtocolName
 from data.recording import Axis
+from ident.estimate import CURVE_PARAMETERS
 from pipelines.loop_settings import ObserverUpdate
 
+FREE_PARAMETERS: Final = {
+    "inertia",
+    *(f"{direction}.{name}" for direction in ("positive", "negative") for name in CURVE_PARAMETERS),
+}
 Number = Annotated[float, Field(allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0)]
 
@@ -72,6 +78,25 @@ class CovarianceEntry(_Entry):
 
     names: tuple[str, ...]
     matrix: tuple[tuple[Number, ...], ...]
+
+    @model_validator(mode="after")
+    def _a_covariance(self) -> Self:
+        unknown = sorted(set(self.names) - FREE_PARAMETERS)
+        if unknown or len(set(self.names)) != len(self.names):
+            raise ValueError(
+                f"names: {unknown[0]!r} is no parameter" if unknown else "names: one stands twice"
+            )
+        if {len(self.names)} != {len(self.matrix), *map(len, self.matrix)} and self.names:
+            raise ValueError(f"matrix: {len(self.names)} names need as many rows of as many numbers")
+        matrix = np.array(self.matrix, dtype=np.float64).reshape(len(self.names), len(self.names))
+        scale = np.sqrt(np.abs(np.diag(matrix)))
+        scale[scale == 0] = 1.0
+        correlation = matrix / np.outer(scale, scale)
+        if not np.allclose(correlation, correlation.T, atol=1e-9):
+            raise ValueError("matrix: a covariance is symmetric")
+        if matrix.size and np.linalg.eigvalsh(correlation)[0] < -1e-6:
+            raise ValueError("matrix: a covariance has no negative eigenvalue")
+        return self
 
 
 class CurveValues(_Entry):
