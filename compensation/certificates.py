@@ -106,7 +106,7 @@ def _exactness(robot: OneLinkRobot, controller: Controller, law: str) -> tuple[C
         unit="N m",
         says="e = 0 is a solution if r = 1, as far as the fitted law is the robot's"
         if same
-        else f"the compensator's law differs from the robot's by up to {gap:.4g} N m: e = 0 is no solution",
+        else f"the compensator's law differs from the robot's by up to {gap:.4g}: e = 0 is no solution",
     )
     unity = Certificate(
         law=law,
@@ -235,7 +235,7 @@ def _single_equilibrium(robot: OneLinkRobot, controller: Controller, law: str) -
         says="no rest but the set point"
         if rests.is_single_point
         else f"the link can rest anywhere in {len(rests.segments)} segment(s) within "
-        f"[{rests.x1_min:.4g}, {rests.x1_max:.4g}] rad",
+        f"[{rests.x1_min:.4g}, {rests.x1_max:.4g}]",
     )
 
 

@@ -3,26 +3,22 @@
 `design.json`, schema `stribeck/design/1`:
 
 - `critical_observer_gain`: `positive`, `negative`, `mean`, `worst`, each `{"value", "interval95", "unit",
-"withheld"}` [1/s];
-  a value that does not exist is `null`, with the reason in `withheld`;
+  "withheld"}`; a value that does not exist is `null`, with the reason in `withheld`;
 - `decay_rate`: `observer_error` (L minus the worst critical gain of the robot as it moves; below 0 errors
-grow) and
-  `loop` (without observer error), the same fields;
-- `overcompensation_threshold`: for each compensator the largest r [-] that overcompensates nowhere, by
-direction; - `equilibrium_sets`: for r = 0, r = 1 and the chosen r at the chosen L: `{"r", "observer_gain",
-"x1_min", "x1_max",
-  "single_point", "segments"}`;
-- `certificates`: `{"robot", "law", "hypothesis", "holds", "margin", "unit", "says"}`, for the compensator
-with each direction's own
-  law and the one with the mean law on the robot, and for the mean law on the mean robot, the paper's
-  analysis;
-- `recommended`: `{"observer_gain", "compensation_gain", "compensator", "largest_rest_error", "why"}`, and
-`alternatives`; - `gains`, `law`, `compensator`, `draws`, `seed`, `withheld`: what was asked, and what could
-not be answered.
+  grow) and `loop` (without observer error), the same fields;
+- `overcompensation_threshold`: by compensator and direction the largest r that overcompensates nowhere;
+- `equilibrium_sets`: for r = 0, r = 1 and the chosen r at the chosen L: `{"r", "observer_gain", "x1_min",
+  "x1_max", "single_point", "segments"}`;
+- `certificates`: `{"robot", "law", "hypothesis", "holds", "margin", "unit", "says"}`, for the
+  compensator with each direction's own law and the one with the mean law on the robot, and for the mean law
+  on the mean robot, the paper's analysis;
+- `recommended`: `{"observer_gain", "compensation_gain", "compensator", "largest_rest_error", "why",
+  "cautions", "alternatives"}`;
+- `gains`, `law`, `compensator`, `draws`, `seed`, `withheld`: what was asked, and what could not be answered.
 
-Intervals are the 2.5 and 97.5 % quantiles over robots drawn from the fit's joint normal distribution. The
-published robot has none: its intervals are null. It moves with the mean of Table 1's columns, and both
-columns are reported.
+Intervals are 2.5 and 97.5 % quantiles over robots drawn from the fit's joint normal distribution. The published
+robot has none: its intervals are null. It moves with the mean of Table 1's columns, and both columns are
+reported.
 """
 
 from __future__ import annotations
@@ -56,6 +52,7 @@ from pipelines.robot_file import RobotFile
 
 DESIGN_SCHEMA: Final = "stribeck/design/1"
 DRAWS: Final = 1000
+FAST_ENOUGH: Final = 0.2  # L h up to which a sampled observer is near the continuous one [-]
 
 
 @dataclass(frozen=True)
@@ -79,6 +76,7 @@ class Design:
     model: OneLinkRobot | None  # what its controller believes
     axis: str
     simulated: bool
+    sample_period: float | None  # of the campaign's loop [s]; None: not known, 0: continuous
 
 
 def design(
@@ -112,6 +110,7 @@ def design(
         model=None,
         axis="rotary" if source.identified is None else source.identified.axis,
         simulated=source.simulated,
+        sample_period=source.loop.sample_period,
     )
     if robot is None:
         return nothing
@@ -218,12 +217,19 @@ def _document(result: Design) -> dict[str, object]:
         "decay_rate": result.decay,
         "overcompensation_threshold": result.thresholds,
         "equilibrium_sets": [_rest_document(r, found, result.gains) for r, found in result.rests],
-        "certificates": [{"robot": name, **asdict(one)} for name, one in result.certificates],
+        "certificates": [
+            {"robot": name, **asdict(one), "unit": _unit(one.unit, result.axis)}
+            for name, one in result.certificates
+        ],
         "recommended": _recommended(result),
         "draws": result.draws,
         "seed": result.seed,
         "withheld": result.withheld,
     }
+
+
+def _unit(unit: str, axis: str) -> str:
+    return {"N m": "N", "rad": "m"}.get(unit, unit) if axis == "linear" else unit
 
 
 def _rest_document(r: float, found: EquilibriumSet, gains: Gains) -> dict[str, object]:
@@ -246,6 +252,17 @@ def _rest_document(r: float, found: EquilibriumSet, gains: Gains) -> dict[str, o
 def _recommended(result: Design) -> dict[str, object]:
     if not result.advice:
         empty = dict.fromkeys(("observer_gain", "compensation_gain", "compensator", "largest_rest_error"))
-        return {**empty, "why": "; ".join(result.withheld), "alternatives": []}
+        return {**empty, "why": "; ".join(result.withheld), "cautions": [], "alternatives": []}
     best, *others = (asdict(advice) for advice in result.advice)
-    return {**best, "alternatives": others}
+    return {**best, "cautions": _cautions(result), "alternatives": others}
+
+
+def _cautions(result: Design) -> list[str]:
+    """Where a sampled controller cannot follow the recommended gain."""
+    gain, period = result.advice[0].observer_gain, result.sample_period
+    if gain is None or not period or gain * period <= FAST_ENOUGH:
+        return []
+    return [
+        f"L h = {gain * period:.3g} at the sample period h = {period:g} s: the sampled observer lags and "
+        f"overshoots (Euler's rule diverges from L h = 2 on). Sample every {FAST_ENOUGH / gain:.2g} s or faster"
+    ]

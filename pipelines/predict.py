@@ -99,10 +99,10 @@ def predict(
         tick=tick,
     )
     rests = tuple(branch for branch in ideal.branches if branch.kind != "limit_cycle")
-    counts = f"counts of {sampling.resolution:.6g} rad" if sampling.resolution else "exact positions"
+    counts = f"encoder counts of {sampling.resolution:.6g}" if sampling.resolution else "exact positions"
     notes = [
         f"limit cycles: runs of {cycles.duration:.4g} s from x1 = {cycles.starts[0]:.4g} and "
-        f"{cycles.starts[1]:.4g} rad, the larger cycle counts; rests: those of the continuous loop"
+        f"{cycles.starts[1]:.4g}, the larger cycle counts; rests: those of the continuous loop"
     ]
     if cycles.undecided:
         shown = ", ".join(f"{value:.6g}" for value in cycles.undecided[:5])

@@ -156,7 +156,7 @@ def _sampled(
         time = np.append(time, duration)
         position, velocity = np.append(position, q[-1]), np.append(velocity, v[-1])
         estimate, held = np.append(estimate, estimate[-1]), np.append(held, held[-1])
-    counts = f"counts of {sampling.resolution:.6g} rad" if sampling.resolution else "exact positions"
+    counts = f"encoder counts of {sampling.resolution:.6g}" if sampling.resolution else "exact positions"
     return SimulatedRun(
         time=time,
         state=np.column_stack((position, estimate, velocity - estimate)),

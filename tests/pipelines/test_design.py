@@ -131,6 +131,22 @@ def test_the_compensator_can_carry_each_directions_own_law(tmp_path: Path) -> No
     assert found["equilibrium_sets"][-1]["single_point"] is True
 
 
+def test_a_slow_controller_is_warned_of_its_observer_gain(tmp_path: Path) -> None:
+    slow = replace(fitted(), loop=LoopDefaults(sample_period=0.01))
+    (caution,) = written(slow, tmp_path / "slow")["recommended"]["cautions"]
+    assert "L h" in caution
+    quick = replace(fitted(), loop=LoopDefaults(sample_period=0.001))
+    assert written(quick, tmp_path / "quick")["recommended"]["cautions"] == []
+
+
+def test_a_linear_axis_has_its_own_units(tmp_path: Path) -> None:
+    source = fitted()
+    assert source.identified is not None
+    found = written(replace(source, identified=replace(source.identified, axis="linear")), tmp_path)
+    units = {certificate["unit"] for certificate in found["certificates"]}
+    assert units == {"1/s", "1", "N", "m"}
+
+
 def test_a_withheld_parameter_withholds_what_needs_it(tmp_path: Path) -> None:
     source = fitted(stribeck_velocity=Estimate(None, "rad/s", withheld="no run below 0.3 rad/s"))
     result = design(source, GAINS)
