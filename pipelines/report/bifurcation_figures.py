@@ -15,9 +15,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from compensation.bifurcation import Branch, Diagram, Point
 from data.recording import FloatArray
 from pipelines.report.axis_units import units_of
-from pipelines.report.drawn_values import BranchPoint, DrawnBranch, DrawnDiagram
 from pipelines.report.style import BLUE, INK, MUTED, VERMILLION, new_figure, styled, zero_lines
 
 _PARAMETER: Final = {"r": "compensation gain $r$", "L": "observer gain $L$ [1/s]"}
@@ -28,7 +28,7 @@ _DOTTED: Final = (0, (1.5, 2))
 
 @styled
 def figure9(
-    diagram: DrawnDiagram,
+    diagram: Diagram,
     *,
     title: str = "Predicted bifurcation diagram",
     subtitle: str = "",
@@ -63,7 +63,7 @@ def figure9(
     return figure
 
 
-def draw_branch(axes: Axes, branch: DrawnBranch, *, cycle: str, rest: str) -> None:
+def draw_branch(axes: Axes, branch: Branch, *, cycle: str, rest: str) -> None:
     """One branch: a filled set, a line of amplitudes, or a line of equilibria; dashed where unstable."""
     value, low, high, amplitude = branch_arrays(branch.points)
     dashes = "-" if branch.stable else (0, (4, 2.2))
@@ -80,15 +80,14 @@ def draw_branch(axes: Axes, branch: DrawnBranch, *, cycle: str, rest: str) -> No
             axes.plot(value, middle, marker="o", markersize=4, color=INK, zorder=3)
 
 
-def branch_arrays(points: Sequence[BranchPoint]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Value, x1_min, x1_max [rad], max|x1| [rad] along a branch, each (n,); NaN where a point has none."""
+def branch_arrays(points: Sequence[Point]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Value, x1_min, x1_max [rad], max|x1| [rad] along a branch, each (n,)."""
     rows = [(point.value, point.x1_min, point.x1_max, point.amplitude) for point in points]
-    columns = np.array([[np.nan if x is None else x for x in row] for row in rows], dtype=np.float64)
-    value, low, high, amplitude = columns.reshape(-1, 4).T
+    value, low, high, amplitude = np.array(rows, dtype=np.float64).reshape(-1, 4).T
     return value, low, high, amplitude
 
 
-def _name(axes: Axes, branch: DrawnBranch) -> None:
+def _name(axes: Axes, branch: Branch) -> None:
     """The branch's roman number, above a line or inside the wider half of a set."""
     value, low, high, amplitude = branch_arrays(branch.points)
     if not value.size:
@@ -104,7 +103,7 @@ def _name(axes: Axes, branch: DrawnBranch) -> None:
     )  # fmt: skip
 
 
-def _legend(diagram: DrawnDiagram) -> list[Line2D | Patch]:
+def _legend(diagram: Diagram) -> list[Line2D | Patch]:
     kinds = {(branch.kind, branch.stable) for branch in diagram.branches if len(branch.points) > 1}
     handles: list[Line2D | Patch] = []
     if ("limit_cycle", True) in kinds:

@@ -18,9 +18,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from compensation.bifurcation import Diagram
 from pipelines.report.axis_units import AxisUnits, units_of
 from pipelines.report.bifurcation_figures import branch_arrays, draw_branch
-from pipelines.report.drawn_values import DrawnDiagram
 from pipelines.report.onset_panel import ROW, Onset, draw_onsets, legend_beside, start_label
 from pipelines.report.style import (
     BLUE,
@@ -52,8 +52,8 @@ Run = Mapping[str, Any]
 def figure10(
     comparison: Mapping[str, Any],
     *,
-    fitted: DrawnDiagram | None = None,
-    symmetric: DrawnDiagram | None = None,
+    fitted: Diagram | None = None,
+    symmetric: Diagram | None = None,
     title: str = "Recorded runs over the prediction",
     subtitle: str = "",
     axis: str = "rotary",
@@ -64,7 +64,7 @@ def figure10(
     onsets: Sequence[Onset] = comparison.get("onset", ())
     known = [onset["start"] for onset in onsets]
     groups = [start_label(_nearest(run["start"], known)) for run in runs]
-    colours = _colours([*groups, *map(start_label, known)])
+    colours = _colours([*map(start_label, known), *groups])
     strip = 1.05 + ROW * len(onsets) if onsets else 0.0
     subtitle = subtitle or _shared_gains(onsets, units_of(axis))
     figure = new_figure(title, height=4.6 + strip, subtitle=subtitle, simulated=simulated)
@@ -109,7 +109,7 @@ def _shared_gains(onsets: Sequence[Onset], units: AxisUnits) -> str:
     )
 
 
-def _draw_symmetric(axes: Axes, diagram: DrawnDiagram) -> None:
+def _draw_symmetric(axes: Axes, diagram: Diagram) -> None:
     for branch in diagram.branches:
         value, low, high, amplitude = branch_arrays(branch.points)
         edges = (amplitude,) if branch.kind == "limit_cycle" else (low, high)

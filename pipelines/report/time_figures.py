@@ -12,15 +12,15 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from data.recording import FloatArray
+from ident.simulation.trajectory import Trajectory
 from pipelines.report.axis_units import AxisUnits, units_of
-from pipelines.report.drawn_values import History
 from pipelines.report.style import BLUE, GREEN, INK, MUTED, VERMILLION, new_figure, plain, styled, zero_lines
 
 
 @styled
 def figure6(
-    exact: History,
-    perturbed: History,
+    exact: Trajectory,
+    perturbed: Trajectory,
     *,
     perturbation: str,
     title: str = "Limit cycle below the critical observer gain",
@@ -47,7 +47,7 @@ def figure6(
 
 @styled
 def figure7(
-    history: History,
+    history: Trajectory,
     *,
     torque: FloatArray | None = None,
     title: str = "Performance above the critical observer gain",
@@ -77,7 +77,7 @@ def figure7(
     return figure
 
 
-def _panel(axes: Axes, history: History, lines: list[tuple[FloatArray, str, str]], label: str) -> None:
+def _panel(axes: Axes, history: Trajectory, lines: list[tuple[FloatArray, str, str]], label: str) -> None:
     zero_lines(axes)
     for number, (values, colour, name) in enumerate(lines):
         dashes = "-" if number == 0 else (0, (3, 1.5))
@@ -90,7 +90,7 @@ def _labels(units: AxisUnits) -> tuple[str, str, str]:
     return f"$x_1$ [{units.position}]", f"$x_2$ [{units.velocity}]", f"$x_3$ [{units.velocity}]"
 
 
-def _finish(axes: Axes, history: History) -> None:
+def _finish(axes: Axes, history: Trajectory) -> None:
     axes.set_xlabel("time [s]", color=INK)
     axes.set_xlim(float(history.time[0]), float(history.time[-1]))
     axes.tick_params(axis="x", color=MUTED)

@@ -2,51 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 
-from data.recording import FloatArray
+from compensation.bifurcation import Bifurcation, Branch, Diagram, Point
+from compensation.controller import Gains
 from ident.friction_map import MapPoint
 from ident.model import published
+from ident.simulation.trajectory import Trajectory
 
 HOSTILE: Final = "<script>alert(1)</script>&\"'=cmd()\x1b[31m\u202e$x_1${{ 7 * 7 }}-->"
-
-
-@dataclass(frozen=True)
-class Motion:
-    time: FloatArray
-    state: FloatArray
-
-
-@dataclass(frozen=True)
-class Point:
-    value: float
-    x1_min: float
-    x1_max: float
-    amplitude: float | None
-
-
-@dataclass(frozen=True)
-class Branch:
-    kind: str
-    stable: bool
-    points: Sequence[Point]
-
-
-@dataclass(frozen=True)
-class Change:
-    value: float
-    kind: str
-
-
-@dataclass(frozen=True)
-class Diagram:
-    parameter: str
-    branches: Sequence[Branch]
-    bifurcations: Sequence[Change]
 
 
 def map_points() -> list[MapPoint]:
@@ -72,24 +38,28 @@ def map_points() -> list[MapPoint]:
     ]
 
 
-def motion() -> Motion:
+def motion() -> Trajectory:
     """A decaying oscillation."""
     time = np.linspace(0.0, 5.0, 200)
     state = np.exp(-time)[:, None] * np.column_stack((np.cos(3 * time), -np.sin(3 * time), 0.1 * time))
-    return Motion(time, state)
+    return Trajectory(time, state, (), "time reached", 5.0, state[-1])
 
 
 def diagram() -> Diagram:
     """A set below r = 1, a cycle and an unstable point above."""
     below, above = np.linspace(0.8, 1.0, 5), np.linspace(1.0, 1.3, 7)
+    rests = tuple(Point(r, r - 1, 1 - r, 1 - r) for r in map(float, below))
+    cycles = tuple(Point(r, 1 - r, r - 1, r - 1, period=6.0) for r in map(float, above))
+    unstable = tuple(Point(r, 0.0, 0.0, 0.0) for r in map(float, above))
     return Diagram(
         "r",
+        Gains(0.4, 0.02, 73.5, 1.0),
         (
-            Branch("equilibrium_set", True, [Point(r, r - 1, 1 - r, 1 - r) for r in map(float, below)]),
-            Branch("limit_cycle", True, [Point(r, 1 - r, r - 1, r - 1) for r in map(float, above)]),
-            Branch("equilibrium", False, [Point(r, 0.0, 0.0, None) for r in map(float, above)]),
+            Branch("equilibrium_set", True, rests),
+            Branch("limit_cycle", True, cycles),
+            Branch("equilibrium", False, unstable),
         ),
-        (Change(1.0, "equilibrium_set_to_limit_cycle"),),
+        (Bifurcation(1.0, "equilibrium_set_to_limit_cycle"),),
     )
 
 

@@ -1,11 +1,13 @@
 """That the figures hold what they are given: every run, every edge, every branch."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
+from compensation.bifurcation import Branch, Point
 from ident.model.published import asymmetric_robot, symmetric_robot
 from pipelines.report.bifurcation_figures import branch_arrays, figure9
 from pipelines.report.comparison_figure import figure10
@@ -129,14 +131,20 @@ class TestFigure9:
             assert name in labels
         assert "r = 1" in labels
 
-    def test_an_absent_number_is_no_zero(self) -> None:
-        value, low, high, amplitude = branch_arrays(examples.diagram().branches[2].points)
+    def test_a_branch_without_points_is_four_empty_columns(self) -> None:
+        value, low, high, amplitude = branch_arrays(examples.diagram().branches[1].points)
         assert value.shape == low.shape == high.shape == (7,)
-        assert np.all(np.isnan(amplitude))
-        assert branch_arrays([])[0].shape == (0,)
+        np.testing.assert_array_equal(amplitude, value - 1)
+        assert [column.shape for column in branch_arrays(())] == [(0,)] * 4
 
     def test_an_empty_diagram_is_still_a_picture(self) -> None:
-        figure9(examples.Diagram("L", (examples.Branch("limit_cycle", True, ()),), ()))
+        empty = replace(examples.diagram(), branches=(Branch("limit_cycle", True, ()),), bifurcations=())
+        assert not figure9(empty).axes[0].lines[1:-1]
+
+    def test_a_set_that_is_one_point_is_seen(self) -> None:
+        point = Branch("equilibrium", True, (Point(1.0, 0.0, 0.0, 0.0),))
+        marks = _marks(figure9(replace(examples.diagram(), branches=(point,))).axes[0], "o")
+        assert [float(np.ravel(mark.get_xdata())[0]) for mark in marks] == [1.0]
 
 
 class TestFigure10:
