@@ -12,13 +12,13 @@
 - `certificates`: `{"robot", "law", "hypothesis", "holds", "margin", "unit", "says"}`, for the
   compensator with each direction's own law and the one with the mean law on the robot, and for the mean law
   on the mean robot, the paper's analysis;
-- `recommended`: `{"observer_gain", "compensation_gain", "compensator", "largest_rest_error", "why",
-  "cautions", "alternatives"}`;
+- `recommended`: `{"observer_gain", "compensation_gain", "compensator", "largest_rest_error",
+  "why", "cautions", "alternatives"}`;
 - `gains`, `law`, `compensator`, `draws`, `seed`, `withheld`: what was asked, and what could not be answered.
 
-Intervals are 2.5 and 97.5 % quantiles over robots drawn from the fit's joint normal distribution. The published
-robot has none: its intervals are null. It moves with the mean of Table 1's columns, and both columns are
-reported.
+Intervals are 2.5 and 97.5 % quantiles over robots drawn from the fit's joint normal distribution. The
+published robot has none: its intervals are null. It moves with the mean of Table 1's columns, and both columns
+are reported.
 """
 
 from __future__ import annotations
@@ -264,5 +264,6 @@ def _cautions(result: Design) -> list[str]:
         return []
     return [
         f"L h = {gain * period:.3g} at the sample period h = {period:g} s: the sampled observer lags and "
-        f"overshoots (Euler's rule diverges from L h = 2 on). Sample every {FAST_ENOUGH / gain:.2g} s or faster"
+        "overshoots (Euler's rule diverges from L h = 2 on). Sample every "
+        f"{FAST_ENOUGH / gain:.2g} s or faster"
     ]
