@@ -17,8 +17,8 @@
 - `gains`, `law`, `compensator`, `draws`, `seed`, `withheld`: what was asked, and what could not be answered.
 
 Intervals are 2.5 and 97.5 % quantiles over robots drawn from the fit's joint normal distribution. The
-published robot has none: its intervals are null. It moves with the mean of Table 1's columns, and both columns
-are reported.
+published robot has none: its intervals are null. It moves with the mean of Table 1's columns, and both
+columns are reported.
 """
 
 from __future__ import annotations
