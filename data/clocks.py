@@ -59,5 +59,5 @@ def clock_report(seconds: FloatArray, *, start: float = 0.0) -> ClockReport:
 def clock_report_ns(stamps: NDArray[np.int64]) -> ClockReport:
     """Describe stamps (n,) [ns]; differences are taken before they become floats."""
     first = int(stamps[0]) if stamps.size else 0
-    seconds: FloatArray = (stamps - first) * 1e-9
+    seconds = ((stamps - first) * 1e-9).astype(np.float64)
     return clock_report(seconds, start=first * 1e-9)

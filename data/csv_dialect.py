@@ -34,6 +34,7 @@ _NUMBER: Final = {
 }
 _BRACKETED: Final = re.compile(r"^(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))$")
 _SUFFIXED: Final = re.compile(r"^.+_(deg|rad|mrad|rpm)$")  # the only endings that cannot mean anything else
+_SETTING: Final = re.compile(r"((?:[\w.\-/ ]{1,60}(?=:))|(?:[\w.\-]{1,60}(?= ?=))) ?[:=] *(.*)")
 _UNITS_ROW: Final = re.compile(r"units?:?$|einheit:?$", re.IGNORECASE)
 
 
@@ -262,7 +263,7 @@ def _metadata(lines: Sequence[str]) -> dict[str, str]:
         if not _is_comment(line):
             continue
         text = line.lstrip().lstrip("#%/").strip()
-        key, sign, value = text.partition(":") if ":" in text else text.partition("=")
-        if sign and key.strip() and len(found) < 1000:
-            found.setdefault(key.strip(), value.strip())
+        setting = _SETTING.fullmatch(text)
+        if setting and len(found) < 1000:
+            found.setdefault(setting[1].strip(), setting[2].strip())
     return found

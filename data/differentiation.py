@@ -28,6 +28,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 from itertools import pairwise
 from typing import Any, Final
 
@@ -141,6 +142,7 @@ def _deviance(position: FloatArray, ratio: float) -> float:
     return float(np.sum(settled**2) / variance + settled.size * np.log(variance))
 
 
+@cache
 def _steady_gain(ratio: float) -> tuple[FloatArray, float]:
     """The filter's gain (3,) and innovation variance at unit step and unit noise, once it has settled."""
     transition = np.asarray(kinematic_state_transition(2, 1.0))

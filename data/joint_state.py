@@ -210,14 +210,14 @@ def matches(shape: Layout, rows: ByteArray) -> NDArray[np.bool_]:
 
 def stamps(rows: ByteArray) -> NDArray[np.int64]:
     """Header stamps (n,) [ns] of messages (n, size)."""
-    seconds = np.ascontiguousarray(rows[:, _STAMP : _STAMP + 4]).view("<i4").reshape(-1)
-    rest = np.ascontiguousarray(rows[:, _STAMP + 4 : _STAMP + 8]).view("<u4").reshape(-1)
+    seconds = rows[:, _STAMP : _STAMP + 4].view("<i4").reshape(-1)
+    rest = rows[:, _STAMP + 4 : _STAMP + 8].view("<u4").reshape(-1)
     return seconds.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
 
 
 def numbers(rows: ByteArray, place: int) -> FloatArray:
     """The numbers (n,) at byte `place` of messages (n, size)."""
-    column: FloatArray = np.ascontiguousarray(rows[:, place : place + 8]).view("<f8").reshape(-1)
+    column: FloatArray = rows[:, place : place + 8].view("<f8").reshape(-1)
     return column
 
 

@@ -81,6 +81,7 @@ class McapWalk:
         self._messages = 0
         self._times: tuple[int, int] | None = None
         self._summary_read = False
+        self._data_ended = False
 
     @property
     def integrity(self) -> Integrity:
@@ -204,7 +205,13 @@ class McapWalk:
             self.metadata.append(record)
         elif isinstance(record, Statistics):
             self._statistics = record
-        elif isinstance(record, DataEnd) and record.data_section_crc and not self._losses:
+        elif isinstance(record, DataEnd):
+            self._end_data(record, begin, end)
+
+    def _end_data(self, record: DataEnd, begin: int, end: int) -> None:
+        """Check the checksum of all that came before, where there is one."""
+        self._data_ended = True
+        if record.data_section_crc and not self._losses:
             before = begin - HEADER.size
             if zlib.crc32(self._content[:before].data) == record.data_section_crc:
                 self._vouched = [0, 1]  # for everything that came before
@@ -235,6 +242,8 @@ class McapWalk:
         size = self._content.size
         footer = parse(Footer.read, self._content[begin:end].tobytes(), where=begin, name="footer")
         self.indexed = footer.summary_start != 0
+        if not self._data_ended and not self._losses:
+            self._losses.append(Loss(0, begin, "the end of the data section is missing"))
         start = footer.summary_start or begin - HEADER.size
         if footer.summary_crc and (
             start > begin or zlib.crc32(self._content[start : begin + 16].data) != footer.summary_crc

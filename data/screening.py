@@ -196,23 +196,23 @@ def _moduli(resolution: float | None, largest: float) -> list[float]:
 def drop_spikes(run: Signals, resolution: float | None) -> tuple[Signals, tuple[Finding, ...]]:
     """E-SPIKE: drop single samples that leave the path and come back.
 
-    A sample is wrong when it lies off the mean of its neighbours by more than eight times the local spread of
-    that distance, six counts, and five times the way between the neighbours.
+    A sample is wrong when it lies off the mean of its neighbours by more than six counts and eight times the
+    local spread of that distance, and each neighbour lies half as far off on the other side: the mark that a
+    single sample leaves, and that neither an impact nor an onset of motion does.
     """
     q = run.position
     off = q[1:-1] - 0.5 * (q[:-2] + q[2:])
     distance = np.abs(off)
-    between = np.abs(q[2:] - q[:-2])
     floor = 6.0 * (resolution or 0.0) + 1e-9 * float(np.ptp(q))
-    suspects = np.flatnonzero(
-        (distance > 5.0 * between + floor) & (distance > 8.0 * float(np.median(distance)))
-    )
+    beside = np.stack((np.roll(off, 1), np.roll(off, -1)))
+    alone = np.all(np.abs(beside + 0.5 * off) < 0.2 * distance, axis=0)
+    suspects = np.flatnonzero(alone & (distance > floor) & (distance > 8.0 * float(np.median(distance))))
     wrong: list[int] = []
     for k in suspects.tolist():
         window = distance[max(0, k - _SPIKE_WINDOW) : k + _SPIKE_WINDOW + 1]
         quiet = np.sort(window)[: int(0.75 * window.size)]
         spread = 1.4826 * float(np.median(window))
-        if distance[k] > max(8.0 * spread, 4.0 * float(quiet[-1])) and distance[k] > floor:
+        if distance[k] > max(8.0 * spread, 4.0 * float(quiet[-1])):
             wrong.append(k + 1)
     if not wrong:
         return run, ()
@@ -257,11 +257,11 @@ def saturation(run: Signals, torque_limit: float | None) -> tuple[Finding, ...]:
         what = f"at the limit of {torque_limit:g}"
     else:
         at_limit = size == top
-        distinct = np.unique(run.torque).size
         starts = np.count_nonzero(np.diff(at_limit.astype(np.int8), prepend=0) == 1)
         flat = int(np.count_nonzero(at_limit))
-        long_enough = flat >= 10 * starts and flat >= 0.01 * size.size
-        if top == 0.0 or starts < 3 or not long_enough or distinct < 0.5 * size.size:
+        long_enough = flat >= 3 * starts and flat >= 0.01 * size.size
+        distinct = np.unique(run.torque[~at_limit]).size
+        if top == 0.0 or starts < 3 or not long_enough or distinct < 0.5 * (size.size - flat):
             return ()
         what = f"flat at its largest value, {top:.6g}"
     k = int(np.argmax(at_limit))

@@ -1,0 +1,137 @@
+"""Inspection: everything about a log with no settings, whole, in part or not at all; none of it trusted."""
+
+import json
+import struct
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from data.csv_log import write_csv
+from data.findings import LogError
+from data.mcap_log import write_mcap
+from pipelines.exit_status import Status
+from pipelines.inspect import SCHEMA, inspect_log, inspect_logs, to_plain
+from pipelines.inspection_text import print_inspection
+from tests.data import hostile
+
+
+def drawn(path: Path) -> str:
+    out = StringIO()
+    print_inspection(inspect_log(path), Console(file=out, width=110, force_terminal=True, color_system=None))
+    return out.getvalue()
+
+
+def test_an_mcap_log(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    time = np.arange(5000, dtype=np.float64) * 1e-3
+    time[3000:] += 0.25
+    write_mcap(
+        path,
+        time=time,
+        position=np.sin(time),
+        effort=0 * time,
+        extra={"/command": time},
+        metadata={"r": "0.9"},
+    )
+    found = to_plain(inspect_log(path))
+    assert found["schema"] == SCHEMA
+    assert (found["format"], found["status"], found["simulated"]) == ("mcap", "whole", False)
+    assert found["integrity"]["checksums"] == "verified"
+    assert found["metadata"]["r"] == "0.9"
+    states, command = found["channels"]
+    assert (states["topic"], command["topic"]) == ("/joint_states", "/command")
+    assert states["schema"] == "sensor_msgs/msg/JointState"
+    for clock in (states["log_clock"], states["header_clock"]):
+        assert clock["samples"] == 5000
+        assert clock["rate"] == pytest.approx(1000.0)
+        assert clock["duration"] == pytest.approx(5.249)
+        assert clock["gaps"] == 1
+        assert clock["longest_gaps"][0] == pytest.approx((2.999, 0.251))
+    position = next(f for f in states["fields"] if f["path"] == "position")
+    assert list(position["joints"]) == ["link"]
+    text = drawn(path)
+    for word in ("checksums verified", "1000 Hz", "1 gaps", "/joint_states:position", "[0] {link}", "0.9"):
+        assert word in text
+
+
+def test_a_csv_log(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    time = np.arange(100, dtype=np.float64) * 0.01
+    write_csv(path, columns={"t [s]": time, "q [deg]": 3 * time, "i": -time}, metadata={"simulated": "true"})
+    found = to_plain(inspect_log(path))
+    assert (found["format"], found["status"], found["simulated"], found["rows"]) == (
+        "csv",
+        "whole",
+        True,
+        100,
+    )
+    assert found["dialect"]["delimiter"] == ","
+    assert [column["unit"] for column in found["columns"]] == ["s", "deg", None]
+    assert found["columns"][1]["high"] == pytest.approx(2.97)
+    assert found["clock"]["rate"] == pytest.approx(100.0)
+    text = drawn(path)
+    for word in ("SIMULATED", "comma between cells", "100 Hz", "q [deg]", "2.97"):
+        assert word in text
+
+
+def test_whole_partly_and_not_at_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    whole, part, none = tmp_path / "whole.mcap", tmp_path / "part.mcap", tmp_path / "none.mcap"
+    content = hostile.run(whole, n=20_000)
+    part.write_bytes(content[: len(content) // 2])
+    none.write_bytes(b"no log")
+    assert inspect_logs([whole]) is Status.DONE
+    assert inspect_logs([part]) is Status.WITHHELD
+    capsys.readouterr()
+    assert inspect_logs([none]) is Status.REFUSED
+    streams = capsys.readouterr()
+    assert streams.out == ""
+    assert "does not begin as an MCAP file does" in streams.err
+    assert inspect_logs([part], as_json=True) is Status.WITHHELD
+    lost = json.loads(capsys.readouterr().out)["integrity"]["lost"]
+    assert lost[0]["end"] == len(content) // 2
+    assert inspect_logs([whole, part, none], as_json=True) is Status.REFUSED
+    answers = json.loads(capsys.readouterr().out)["logs"]
+    assert [answer["status"] for answer in answers] == ["whole", "partly readable", "unreadable"]
+
+
+@pytest.mark.parametrize(
+    "name", ["none.mcap", "none.csv", "folder.csv", "empty.csv", "prose.csv", "x.parquet"]
+)
+def test_what_cannot_be_read(tmp_path: Path, name: str) -> None:
+    (tmp_path / "folder.csv").mkdir()
+    (tmp_path / "empty.csv").touch()
+    (tmp_path / "prose.csv").write_text("this is\nno log\n")
+    with pytest.raises(LogError, match=name):
+        inspect_log(tmp_path / name)
+
+
+def test_channels_that_cannot_be_decoded_are_listed_with_the_reason(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    head = hostile.schema(1, "x.Y", "protobuf", b"") + hostile.channel(1, 1, "/p", "protobuf")
+    path.write_bytes(hostile.file(head, hostile.message(1, 1, b"\x08\x01")))
+    channel = to_plain(inspect_log(path))["channels"][0]
+    assert "protobuf" in channel["refused"]
+    assert channel["fields"] == ()
+    assert "protobuf" in drawn(path)
+
+
+def test_names_from_a_log_are_only_names(tmp_path: Path) -> None:
+    nasty = "/a\x1b]0;owned\x07\x1b[31m[bold red]x[/bold red]\n" + "y" * 5000
+    path = tmp_path / "run.mcap"
+    head = hostile.schema(1, nasty, "jsonschema", b"") + hostile.channel(1, 1, nasty, "json")
+    body = json.dumps({nasty: nasty, "[link=file:///]": 1.0}).encode()
+    pair = hostile.text(nasty) * 2
+    record = hostile.record(12, hostile.text(nasty) + struct.pack("<I", len(pair)) + pair)
+    path.write_bytes(hostile.file(head, hostile.message(1, 1, body), record))
+    text = drawn(path)
+    assert "\x1b]" not in text
+    assert "\x1b[31m" not in text
+    assert "\x07" not in text
+    assert "[bold red]" in text
+    assert len(text) < 20_000
+    table = tmp_path / "run.csv"
+    table.write_bytes(b"# a\x1b[31m: \x1b[32mb\nt,\x1b[31mq[bold]\n0,1\n1,2\n")
+    assert "\x1b[3" not in drawn(table)
