@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 
 from mcap.records import Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
@@ -34,7 +36,9 @@ def decoder(channel: Channel, schema: Schema | None) -> Decode:
         return lambda raw: _guarded(json.loads, raw, topic)
     if encoding == "cdr" and schema is not None and schema.encoding == "ros2msg":
         try:
-            decode = DecoderFactory().decoder_for(encoding, schema)
+            # The parser prints what it cannot read, as it stands in the log, terminal escapes and all.
+            with redirect_stderr(StringIO()), redirect_stdout(StringIO()):
+                decode = DecoderFactory().decoder_for(encoding, schema)
         except Exception as error:
             raise LogError(f"{topic}: its schema cannot be read ({_reason(error)})") from error
         if decode is not None:

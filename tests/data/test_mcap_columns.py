@@ -137,7 +137,7 @@ def test_json_with_and_without_schema(with_schema: bool) -> None:
     assert topic.header_time.tolist() == [3_000_000_004]
 
 
-def test_unread_encodings_and_broken_messages_are_refused_by_name() -> None:
+def test_unread_encodings_and_broken_messages_are_refused_by_name(capfd: pytest.CaptureFixture[str]) -> None:
     cases = [
         (
             hostile.schema(1, "S", "protobuf", b"") + hostile.channel(1, 1, "/a", "protobuf"),
@@ -163,6 +163,7 @@ def test_unread_encodings_and_broken_messages_are_refused_by_name() -> None:
         content = np.frombuffer(hostile.file(head, hostile.message(1, 1, body)), np.uint8)
         with pytest.raises(LogError, match=why):
             read_columns(content, [parse_path("/a:position")])
+    assert capfd.readouterr() == ("", "")  # a foreign parser may not print what a log holds
 
 
 def test_two_publishers_at_once_are_refused_and_in_turn_are_joined() -> None:
