@@ -21,7 +21,7 @@ TimeArray = NDArray[np.int64]
 class Aligned:
     """A signal at the position's stamps."""
 
-    values: FloatArray  # (n,); NaN before its first message
+    values: FloatArray  # (n,) [as logged]; NaN before its first message
     together: bool  # sampled with the position, message by message
     longest_hold: float  # [s] the longest time that a value stood in for newer ones
 

@@ -25,8 +25,8 @@ class Column:
     number: int
     header: str  # empty where there is none
     unit: str | None
-    low: float | None  # None: no number in it
-    high: float | None
+    low: float | None  # [as logged]; None: no number in it
+    high: float | None  # [as logged]
     missing: int  # cells that are empty or NaN
     text: str | None = None  # why it is no column of numbers
 

@@ -59,7 +59,7 @@ class _Door:
     log: str
     signals: Signals
     axis: Axis
-    encoder_counts: float | None
+    encoder_counts: float | None  # [1/revolution], linear [1/m]
     salvage: bool
 
     def wanted(self) -> dict[Quantity, Signal]:

@@ -32,7 +32,7 @@ class Field:
     """One field of a channel's messages, from the first one."""
 
     path: str  # as a field path after the topic's colon
-    value: float | str | None  # of the first message; None: an empty array
+    value: float | str | None  # [as logged] of the first message; None: an empty array
     length: int | None = None  # of an array
     joints: tuple[str, ...] = ()  # names beside an array of that length
 

@@ -36,9 +36,9 @@ class Signal:
 
     source: str | int  # CSV: header, header without its unit, or number from 0; MCAP: topic:field.path[i]
     unit: str | None = None  # None: SI
-    scale: float | None = None  # None: 1; an A or V needs one
+    scale: float | None = None  # [-], for A or V [N m/A] or [N m/V]; None: 1
     sign: int = 1  # +1 or -1
-    offset: float = 0.0  # in SI
+    offset: float = 0.0  # [SI]
 
     def __post_init__(self) -> None:
         if self.unit is not None:

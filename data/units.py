@@ -42,7 +42,7 @@ class Unit:
 
     word: str
     kind: Kind
-    factor: float  # SI units in one of these; 1 for counts, which have no size of their own
+    factor: float  # [SI per unit]; 1 for counts, which have no size of their own
 
 
 _TURN: Final = 2.0 * math.pi
