@@ -41,7 +41,7 @@ COLUMNS: Final = 16
 POSITION, ESTIMATE, ERROR = range(3)
 REVERSAL: Final = 0  # surface x2 = 0
 MOTION: Final = 1  # surface v = 0
-REST_MARGIN: Final = 32 * 2.220446049250313e-16  # rounding of the torque balance
+REST_MARGIN: Final = 256 * 2.220446049250313e-16  # rounding of the torque balance
 NEWTON_LIMIT: Final = 100
 SLOWEST: Final = 1e-12  # [1/s] stands for an observer without gain or damping, whose estimate never settles
 
@@ -50,6 +50,12 @@ SLOWEST: Final = 1e-12  # [1/s] stands for an observer without gain or damping, 
 def _fading(speed: float, width: float, shape: float) -> float:
     """(s/v_s)^beta; for beta = 1 continued through 0 analytically, else evenly."""
     return speed / width if shape == 1.0 else (abs(speed) / width) ** shape
+
+
+@compiled
+def _difference(estimated: float, by_velocity: float, exponent: float) -> float:
+    """exp(-by_velocity) - estimated, where estimated = exp(-by_velocity - exponent): 0 for exponent 0."""
+    return estimated * expm1(exponent) if exponent <= 0.0 else -exp(-by_velocity) * expm1(-exponent)
 
 
 @compiled
@@ -63,9 +69,9 @@ def field(signs: Signs, state: FloatArray, parameters: FloatArray, out: FloatArr
     if k[ALIKE] == 0.0:
         w = exp(-by_velocity)
     elif k[SHAPEV] == 1.0:
-        w = e * expm1(-k[SIGNV] * x3 / k[WIDTHV])
+        w = _difference(e, by_velocity, -k[SIGNV] * x3 / k[WIDTHV])
     else:
-        w = e * expm1(by_estimate - by_velocity)
+        w = _difference(e, by_velocity, by_estimate - by_velocity)
     out[0] = x2 + x3
     out[1] = k[C1] * x1 + k[C2] * x2 + k[GAIN] * x3
     out[2] = k[A1] * x1 + k[A2] * x2 + k[A3] * x3 + k[K0] + k[K2] * e + k[KV] * w
@@ -91,7 +97,7 @@ def series(
     rate2, ratev = -k[SIGN2] / k[WIDTH2], -k[SIGNV] / k[WIDTHV]
     e[0] = exp(-(k[SIGN2] * p2[0] / k[WIDTH2]))
     if alike:
-        w[0] = e[0] * expm1(-k[SIGNV] * p3[0] / k[WIDTHV])
+        w[0] = _difference(e[0], k[SIGNV] * (p2[0] + p3[0]) / k[WIDTHV], -k[SIGNV] * p3[0] / k[WIDTHV])
     else:
         w[0] = exp(-(k[SIGNV] * (p2[0] + p3[0]) / k[WIDTHV]))
     for i in range(order):

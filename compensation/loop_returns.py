@@ -16,76 +16,69 @@ from typing import Final
 
 import numpy as np
 
-from compensation.loop_modes import MOTION, SURFACE_ROWS, SYSTEM
-from compensation.loop_runs import begin, run_dormand_prince, run_series
+from compensation.loop_modes import MOTION, SURFACE_ROWS, SYSTEM, surfaces
+from compensation.loop_runs import begin
 from compensation.loop_tangents import DEVIATIONS, STATES, TANGENTS, stick_deviations
 from compensation.orbits.saltation import carry, project_along, saltate
-from ident.simulation.compiled import compiled
+from ident.simulation.compiled import compiled, specialised
 from ident.simulation.dormand_prince import DORMAND_PRINCE
-from ident.simulation.filippov_system import FloatArray, Signs
-from ident.simulation.integrate import SECTION, WORK_ROWS
+from ident.simulation.filippov_system import FloatArray, OneStepMethod, Signs
+from ident.simulation.integrate import SECTION, WORK_ROWS, Progress, Record, Settings, integrate
 from ident.simulation.taylor import MAX_ORDER, TAYLOR
 
 EVENT_STORE: Final = 256  # of a half turn: chattering beyond that is reported as no return
 STEP_LIMIT: Final = 200_000
 
 
-@compiled
-def half_turn(
+@specialised
+def _to_halt(
+    method: OneStepMethod,
     parameters: FloatArray,
-    analytic: bool,
     tolerance: float,
     patience: float,
     state: FloatArray,
     signs: Signs,
     contact: Signs,
-) -> tuple[float, int]:
-    """To the next halt of the link, in place: (duration [s], reason), SECTION where there was one."""
-    none, none2 = np.empty(0), np.empty((0, STATES))
-    which, modes = np.empty(0, np.int64), np.empty((0, 2), np.int64)
-    if analytic:
-        end = run_series(
-            parameters, tolerance, patience, STEP_LIMIT, MOTION, 0, 1, 0.0, state, signs, contact,
-            none, none2, none, which, modes, none2,
-        )  # fmt: skip
-    else:
-        end = run_dormand_prince(
-            parameters, tolerance, patience, STEP_LIMIT, MOTION, 0, 1, 0.0, state, signs, contact,
-            none, none2, none, which, modes, none2,
-        )  # fmt: skip
-    return end.time, end.reason
+    event_times: FloatArray,
+    event_surfaces: Signs,
+    event_signs: Signs,
+    event_states: FloatArray,
+) -> Progress:
+    """To the next halt of the link, in place."""
+    settings = Settings(tolerance, patience, STEP_LIMIT, MOTION, 0, 1)
+    record = Record(
+        np.empty(0), np.empty((0, STATES)), event_times, event_surfaces, event_signs, event_states
+    )
+    return integrate(method, SYSTEM, surfaces(), parameters, settings, 0.0, state, signs, contact, record)
 
 
-@compiled
-def returns(
+@specialised
+def _returns(
+    method: OneStepMethod,
     parameters: FloatArray,
-    analytic: bool,
     symmetric: bool,
     tolerance: float,
     patience: float,
     start: FloatArray,
     points: FloatArray,
 ) -> tuple[int, int]:
-    """Follow the return map from `start` (3,) for as many returns as `points` has rows: (returns, reason).
-
-    A row (5,): x1, x2 of the return, its duration [s], lowest and highest x1 on the way. In the symmetric map
-    every row stands in the frame of its own half turn: the way is followed by a change of sign.
-    """
     state = start.copy()
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
+    times, states = np.empty(0), np.empty((0, STATES))
+    which, modes = np.empty(0, np.int64), np.empty((0, 2), np.int64)
     begin(parameters, state, signs, contact)
     for row in range(points.shape[0]):
         duration = 0.0
         low = high = state[0]
         while True:
             before = state[0]
-            span, reason = half_turn(
-                parameters, analytic, tolerance, patience - duration, state, signs, contact
+            end = _to_halt(
+                method, parameters, tolerance, patience, state, signs, contact, times, which, modes, states
             )
-            duration += span
+            duration += end.time
             low, high = min(low, state[0]), max(high, state[0])
-            if reason != SECTION:
-                return row, reason
+            if end.reason != SECTION:
+                return row, end.reason
             if symmetric or state[0] > before:
                 break
         if symmetric:
@@ -97,36 +90,26 @@ def returns(
     return points.shape[0], SECTION
 
 
-@compiled
-def half_turn_derivative(
+@specialised
+def _derivative(
+    method: OneStepMethod,
     parameters: FloatArray,
-    analytic: bool,
     tolerance: float,
     patience: float,
     state: FloatArray,
     out: FloatArray,
 ) -> int:
-    """Derivative (2, 2) of the half turn from the halt `state` (3,), which moves to the next halt; reason."""
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     begin(parameters, state, signs, contact)
-    y = np.empty(STATES * (1 + DEVIATIONS))
+    y = np.zeros(STATES * (1 + DEVIATIONS))
     y[:STATES] = state
-    y[STATES:] = 0.0
     y[3], y[7], y[8] = 1.0, 1.0, -1.0  # deviations within the section: by x1, and by x2 = -x3
     mode = signs.copy()
     times, which = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64)
     modes, states = np.empty((EVENT_STORE, 2), np.int64), np.empty((EVENT_STORE, STATES))
-    none, none2 = np.empty(0), np.empty((0, STATES))
-    if analytic:
-        end = run_series(
-            parameters, tolerance, patience, STEP_LIMIT, MOTION, 0, 1, 0.0, state, signs, contact,
-            none, none2, times, which, modes, states,
-        )  # fmt: skip
-    else:
-        end = run_dormand_prince(
-            parameters, tolerance, patience, STEP_LIMIT, MOTION, 0, 1, 0.0, state, signs, contact,
-            none, none2, times, which, modes, states,
-        )  # fmt: skip
+    end = _to_halt(
+        method, parameters, tolerance, patience, state, signs, contact, times, which, modes, states
+    )
     if end.reason != SECTION:
         return end.reason
     polynomials = np.empty((y.size, MAX_ORDER + 1))
@@ -138,10 +121,8 @@ def half_turn_derivative(
         span = times[event] - now
         if mode[MOTION] == 0:
             stick_deviations(deviations, mode[0], parameters, span)
-        elif analytic:
-            carry(TAYLOR, TANGENTS, parameters, mode, y, span, tolerance, polynomials, work)
         else:
-            carry(DORMAND_PRINCE, TANGENTS, parameters, mode, y, span, tolerance, polynomials, work)
+            carry(method, TANGENTS, parameters, mode, y, span, tolerance, polynomials, work)
         y[:STATES] = states[event]
         normal = SURFACE_ROWS[which[event], :STATES]
         _rate(parameters, mode, states[event], before)
@@ -168,3 +149,50 @@ def _rate(parameters: FloatArray, mode: Signs, state: FloatArray, out: FloatArra
     SYSTEM.field(slipping, state, parameters, out)
     out[0] = 0.0
     out[2] = -out[1]
+
+
+@compiled
+def returns_by_series(
+    parameters: FloatArray,
+    symmetric: bool,
+    tolerance: float,
+    patience: float,
+    start: FloatArray,
+    points: FloatArray,
+) -> tuple[int, int]:
+    """Follow the return map from `start` (3,) for as many returns as `points` has rows: (returns, reason).
+
+    A row (5,): x1, x2 of the return, its duration [s], lowest and highest x1 on the way. In the symmetric map
+    every row stands in the frame of its own half turn: the way is followed by a change of sign. `patience`
+    [s] is for one half turn.
+    """
+    return _returns(TAYLOR, parameters, symmetric, tolerance, patience, start, points)
+
+
+@compiled
+def returns_by_dormand_prince(
+    parameters: FloatArray,
+    symmetric: bool,
+    tolerance: float,
+    patience: float,
+    start: FloatArray,
+    points: FloatArray,
+) -> tuple[int, int]:
+    """As `returns_by_series`, for any shape of the laws."""
+    return _returns(DORMAND_PRINCE, parameters, symmetric, tolerance, patience, start, points)
+
+
+@compiled
+def derivative_by_series(
+    parameters: FloatArray, tolerance: float, patience: float, state: FloatArray, out: FloatArray
+) -> int:
+    """Derivative (2, 2) of the half turn from the halt `state` (3,), which moves to the next halt; reason."""
+    return _derivative(TAYLOR, parameters, tolerance, patience, state, out)
+
+
+@compiled
+def derivative_by_dormand_prince(
+    parameters: FloatArray, tolerance: float, patience: float, state: FloatArray, out: FloatArray
+) -> int:
+    """As `derivative_by_series`, for any shape of the laws."""
+    return _derivative(DORMAND_PRINCE, parameters, tolerance, patience, state, out)

@@ -9,7 +9,12 @@ from typing import Final
 import numpy as np
 
 from compensation.closed_loop import ClosedLoop, mode_parameters
-from compensation.loop_returns import half_turn_derivative, returns
+from compensation.loop_returns import (
+    derivative_by_dormand_prince,
+    derivative_by_series,
+    returns_by_dormand_prince,
+    returns_by_series,
+)
 from compensation.loop_runs import is_analytic
 from compensation.orbits.periodic_orbits import Returns
 from ident.model.friction import StribeckFriction
@@ -19,7 +24,7 @@ from ident.simulation.integrate import END_REASONS, SECTION
 
 TOLERANCE: Final = 1e-13  # of a step; series lose nothing by it
 TOLERANCE_ELSE: Final = 1e-11  # of a Dormand-Prince step
-PATIENCE: Final = 200.0  # [s] for one return
+PATIENCE: Final = 200.0  # [s] for one half turn
 
 
 @dataclass(frozen=True)
@@ -52,9 +57,8 @@ class LoopSection:
     def follow_state(self, state: FloatArray, count: int) -> Returns:
         """The next returns after any state (3,)."""
         rows = np.empty((count, 5))
-        made, reason = returns(
-            self._parameters, self._analytic, self.symmetric, self._tolerance, PATIENCE, state, rows
-        )
+        kernel = returns_by_series if self._analytic else returns_by_dormand_prince
+        made, reason = kernel(self._parameters, self.symmetric, self._tolerance, PATIENCE, state, rows)
         rows = rows[:made]
         return Returns(rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], END_REASONS[reason])
 
@@ -65,9 +69,8 @@ class LoopSection:
         while True:
             before = state[0]
             once = np.empty((2, 2))
-            reason = half_turn_derivative(
-                self._parameters, self._analytic, self._tolerance, PATIENCE, state, once
-            )
+            kernel = derivative_by_series if self._analytic else derivative_by_dormand_prince
+            reason = kernel(self._parameters, self._tolerance, PATIENCE, state, once)
             if reason != SECTION:
                 return None
             slope = once @ slope

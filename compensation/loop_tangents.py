@@ -94,8 +94,7 @@ def tangent_series(
         p1[0], p2[0], p3[0] = state[s], state[s + 1], state[s + 2]
         te[0] = rate2 * e[0] * p2[0]
         if alike:
-            growth = expm1(-k[SIGNV] * state[2] / k[WIDTHV])
-            tw[0] = te[0] * growth + ratev * (e[0] + w[0]) * p3[0]
+            tw[0] = ratev * (w[0] * (p2[0] + p3[0]) + e[0] * p3[0])
         else:
             tw[0] = ratev * w[0] * (p2[0] + p3[0])
         for i in range(order):

@@ -17,6 +17,7 @@ from ident.simulation.filippov_system import FloatArray
 SHORTEST = 1e-14  # part of a step below which a double zero counts as one
 ROUNDING = 1e-10  # of the first coefficient that counts, against the sum of the others
 NEWTON_LIMIT = 60
+MOST_CRAWLS = 32  # of the shortest parts: a polynomial that vanishes identically has no first zero
 
 
 @compiled
@@ -46,7 +47,8 @@ def _isolate(q: FloatArray, degree: int) -> float:
     """First zero of q, which is >= 0 at 0, on (0, 1]; q is overwritten."""
     start = 0.0
     width = 1.0
-    while True:
+    crawled = 0
+    while crawled < MOST_CRAWLS:
         rest = 0.0
         slope_rest = 0.0
         power = 1.0
@@ -64,6 +66,7 @@ def _isolate(q: FloatArray, degree: int) -> float:
             if _value(q, degree, width) < 0.0:
                 return start + width
             clear = True
+            crawled += 1
         if clear:
             start += width
             if start >= 1.0:
@@ -72,6 +75,7 @@ def _isolate(q: FloatArray, degree: int) -> float:
             width = 1.0 - start
         else:
             width *= 0.5
+    return inf if _value(q, degree, 1.0 - start) >= 0.0 else start
 
 
 @compiled

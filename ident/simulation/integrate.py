@@ -27,6 +27,7 @@ from ident.simulation.filippov_system import (
     OneStepMethod,
     Signs,
     Surfaces,
+    leaving_rate,
     project,
     resolve,
     switching_value,
@@ -38,10 +39,19 @@ EQUILIBRIUM: Final = 1
 STEP_LIMIT: Final = 2
 SECTION: Final = 3
 EVENTS_FULL: Final = 4
-END_REASONS: Final = ("time reached", "equilibrium", "step limit", "section reached", "event store full")
+NOT_FINITE: Final = 5
+END_REASONS: Final = (
+    "time reached",
+    "equilibrium",
+    "step limit",
+    "section reached",
+    "event store full",
+    "not finite",
+)
 
 WORK_ROWS: Final = 20
 STALLED_EVENTS: Final = 200  # events at one instant, after which the step limit is declared reached
+BALANCE: Final = 1e-9  # of the rate on the other side: so slow a departure may be rounding
 
 
 class Settings(NamedTuple):
@@ -134,6 +144,8 @@ def integrate(
             length, degree, suggested = method.step(
                 system, signs, state, parameters, settings.tolerance, left, suggested, polynomials, work
             )
+            if not _finite(polynomials, n, degree):
+                return Progress(time, NOT_FINITE, output, events, step)
             _switching_polynomials(surfaces, n, degree, polynomials)
             part = 1.0
             for i in range(m):
@@ -161,6 +173,8 @@ def integrate(
                 continue
             arrived_from = signs[surface]
             _meet(system, surfaces, parameters, surface, state, signs, contact, work[0])
+            if signs[surface] == arrived_from:
+                _hold(system, surfaces, parameters, surface, state, signs, contact, work[0])
         if events < record.event_times.size:
             record.event_times[events] = time
             record.event_surfaces[events] = surface
@@ -180,6 +194,37 @@ def integrate(
 @compiled
 def _slides(signs: Signs) -> bool:
     return bool(np.any(signs == 0))
+
+
+@compiled
+def _finite(polynomials: FloatArray, n: int, degree: int) -> bool:
+    total = 0.0
+    for i in range(n):
+        total += abs(polynomials[i, degree]) + abs(polynomials[i, 1])
+    return bool(np.isfinite(total))
+
+
+@specialised
+def _hold(
+    system: FilippovSystem,
+    surfaces: Surfaces,
+    parameters: FloatArray,
+    surface: int,
+    state: FloatArray,
+    signs: Signs,
+    contact: Signs,
+    rate: FloatArray,
+) -> None:
+    """Let a state that only touched its surface slide, where it is driven off by next to nothing.
+
+    The slide knows exactly whether it lasts; after a true graze it ends at once.
+    """
+    n = state.size
+    here = leaving_rate(system, surfaces, surface, signs[surface], signs, state, parameters, rate[:n])
+    there = leaving_rate(system, surfaces, surface, -signs[surface], signs, state, parameters, rate[:n])
+    if abs(here) <= BALANCE * abs(there):
+        signs[surface] = 0
+        contact[surface] = 0
 
 
 @specialised
