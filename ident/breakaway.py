@@ -28,6 +28,7 @@ SUSTAINED_COUNTS = 20.0
 ONSET_COUNTS = 3.5  # the first reading beyond is the onset
 LEAST_SAMPLES = 12  # of a ramp
 STRAIGHT = 0.001  # part of the torque by which a ramp may bend off its line
+KEPT = 0.7  # part of the longest straight stretch that the line goes through
 AT_LIMIT = 0.99  # part of the torque limit
 
 
@@ -86,13 +87,14 @@ def _start(recording: Recording, rest: Stretch, after: int) -> Breakaway | None:
     late = recording.position[rest.last - max(1, (rest.last - rest.first) * 3 // 10) : rest.last]
     place = float(np.median(late))
     away = recording.position[rest.first : max(after, rest.last)] - place
-    far = np.flatnonzero(np.abs(away[late.size :]) >= SUSTAINED_COUNTS * resolution)
-    if far.size == 0:
-        return _no_start(recording, rest, place, float(np.max(np.abs(away))) / resolution)
-    sustained = int(far[0]) + late.size
-    direction = 1 if away[sustained] > 0 else -1
     scatter = 3.0 * 1.4826 * float(np.median(np.abs(late - place)))
     least = (ONSET_COUNTS + np.ceil(scatter / resolution)) * resolution
+    searched = rest.last - late.size - rest.first
+    far = np.flatnonzero(np.abs(away[searched:]) >= max(SUSTAINED_COUNTS * resolution, 2.0 * least))
+    if far.size == 0:
+        return _no_start(recording, rest, place, float(np.max(np.abs(away))) / resolution)
+    sustained = int(far[0]) + searched
+    direction = 1 if away[sustained] > 0 else -1
     before = int(np.flatnonzero(direction * away[: sustained + 1] < least)[-1])
     onset = rest.first + before + 1
     end = _end_of_motion(recording, rest.first + sustained, after, direction)
@@ -197,30 +199,47 @@ def _ramp_line(recording: Recording, first: int, onset: int) -> RampLine:
     none = RampLine(
         float(torque[-1]) if torque.size else 0.0, float("nan"), 0.0, float(recording.time[first])
     )
-    noise = (
-        float(np.sqrt(np.mean(np.diff(torque[-torque.size // 2 :]) ** 2) / 2.0)) if torque.size > 4 else 0.0
-    )
-    best = none
-    size = LEAST_SAMPLES
+    noise, step = _texture(torque)
+    longest, size = 0, LEAST_SAMPLES
     while size <= torque.size:
-        line, misfit = _line(time[-size:], torque[-size:], noise)
-        if best is none or misfit <= 1.0:
-            rise = abs(line.rate) * (time[-1] - time[-size])
-            best = line if rise > 5.0 * line.stderr + STRAIGHT * abs(line.torque) else best
+        _, misfit = _line(time[-size:], torque[-size:], noise, step)
+        if misfit <= 1.0:
+            longest = size
         elif misfit > 3.0:
             break
         size = size + max(1, size // 4)
-    return best
+    # The last step may have gone past the start of the ramp by less than the test sees.
+    size = max(LEAST_SAMPLES, int(KEPT * longest))
+    if longest == 0:
+        return none
+    line, _ = _line(time[-size:], torque[-size:], noise, step)
+    rise = abs(line.rate) * (time[-1] - time[-size])
+    return line if rise > 5.0 * line.stderr + STRAIGHT * abs(line.torque) else none
 
 
-def _line(time: FloatArray, torque: FloatArray, noise: float) -> tuple[RampLine, float]:
+def _texture(torque: FloatArray) -> tuple[float, float]:
+    """Standard deviation of a torque's noise [N m], and the size of its steps where it rises in steps.
+
+    Both are medians, which the one jump of a torque that is switched on leaves alone.
+    """
+    change = np.abs(np.diff(torque))
+    if change.size == 0:
+        return 0.0, 0.0
+    typical = float(np.median(change))
+    if typical > 0.0:
+        return 1.4826 * typical / float(np.sqrt(2.0)), 0.0
+    steps = change[change > 0.0]
+    return 0.0, float(np.median(steps)) if steps.size > LEAST_SAMPLES else 0.0
+
+
+def _line(time: FloatArray, torque: FloatArray, noise: float, step: float) -> tuple[RampLine, float]:
     """Least-squares line, and its lack of straightness: 1 where block means just stray as far as allowed."""
     centred = time - time[-1]
     basis = np.column_stack([np.ones_like(centred), centred])
     coefficient, *_ = np.linalg.lstsq(basis, torque, rcond=None)
     residual = torque - basis @ coefficient
     blocks = np.array([piece.mean() for piece in np.array_split(residual, 6)])
-    allowed = 4.0 * noise * np.sqrt(6.0 / time.size) + STRAIGHT * abs(float(coefficient[0]))
+    allowed = 3.0 * noise * np.sqrt(6.0 / time.size) + STRAIGHT * abs(float(coefficient[0])) + step
     misfit = float(np.max(np.abs(blocks))) / max(allowed, float(np.finfo(np.float64).tiny))
     scatter = max(noise, float(np.std(residual)))
     at_end = np.linalg.inv(basis.T @ basis)[0, 0]

@@ -169,7 +169,7 @@ def _fit(recording: Recording, first: int, past: int) -> ResponseFit | None:
         return None
     power = np.full(lines.angle.size, lines.white)
     duration = lines.period * (span[1] - span[0])
-    solution = np.zeros(3)
+    solution = np.array([0.0, 1.0, 0.0])
     used = lines.excited
     jacobian = np.zeros((1, 3))
     for _ in range(REWEIGHTS):

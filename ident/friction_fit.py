@@ -33,6 +33,7 @@ SIGN: Final[Mapping[Direction, int]] = {"positive": 1, "negative": -1}
 
 GRID = 40  # Stribeck velocities tried as starts in each direction
 STARTS = 8  # polished by the full fit
+FELT = 0.1  # change of the residuals, in standard errors, under a parameter's own size: less is not felt
 SAME = 1.0  # chi-square above the least, below which another minimum is as good
 
 
@@ -64,7 +65,7 @@ class FrictionFit:
 
     values: Mapping[str, float]
     free: tuple[str, ...]  # names of the free parameters, in the order of the covariance
-    covariance: FloatArray  # (p, p); nan where lmfit could not tell
+    covariance: FloatArray  # (p, p); infinite variance where the data do not feel a parameter
     chi_square: float
     report: str
     other_minimum: Mapping[str, float] | None  # a second one that fits as well
@@ -102,9 +103,11 @@ def residuals(data: FitData, values: Mapping[str, float]) -> FloatArray:
         parts.append((data.torque[own] - predicted) / data.run_stderr[own])
         own = data.start_direction == SIGN[direction]
         parts.append((data.start_torque[own] - law[0] - law[1]) / data.start_stderr[own])
-        for motion, whitening in zip(data.momenta, data.whitening, strict=True):
-            if motion.direction == SIGN[direction]:
-                parts.append(whitening @ motion.residual(inertia, law))
+        parts += [
+            whitening @ motion.residual(inertia, law)
+            for motion, whitening in zip(data.momenta, data.whitening, strict=True)
+            if motion.direction == SIGN[direction]
+        ]
     if data.inertia is not None:
         parts.append(np.array([(inertia - data.inertia[0]) / data.inertia[1]]))
     return np.concatenate(parts)
@@ -122,11 +125,10 @@ def fit_friction(data: FitData, *, free_beta: bool, start: FrictionFit | None = 
     best = results[0]
     values = {name: float(value) for name, value in best.params.valuesdict().items()}
     free = tuple(best.var_names)
-    covariance = best.covar if best.covar is not None else np.full((len(free), len(free)), np.nan)
     return FrictionFit(
         values=values,
         free=free,
-        covariance=np.asarray(covariance, dtype=np.float64),
+        covariance=_covariance(data, values, free),
         chi_square=float(best.chisqr),
         report=str(lmfit.fit_report(best, show_correl=True, min_correl=0.3)),
         other_minimum=_other_minimum(results),
@@ -161,6 +163,28 @@ def _polish(data: FitData, start: Mapping[str, float], *, free_beta: bool) -> lm
         xtol=1e-12,
         gtol=1e-12,
     )
+
+
+def _covariance(data: FitData, values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
+    """Inverse of the information of the free parameters (p, p).
+
+    lmfit gives up the errors of all where one parameter is not felt by the data (a Stribeck velocity without
+    a Stribeck effect); here that one alone has none.
+    """
+    columns = []
+    for name in free:
+        step = 1e-6 * max(abs(values[name]), 1e-6 * max(abs(value) for value in values.values()))
+        ahead, behind = (residuals(data, {**values, name: values[name] + off}) for off in (step, -step))
+        columns.append((ahead - behind) / (2 * step))
+    jacobian = np.column_stack(columns)
+    size = np.array([abs(values[name]) for name in free])
+    norm = np.linalg.norm(jacobian, axis=0)
+    felt = (norm * size > FELT) | ((size == 0) & (norm > 0))
+    covariance = np.diag(np.where(felt, 0.0, np.inf))
+    scaled = jacobian[:, felt] / norm[felt]
+    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14, hermitian=True)
+    covariance[np.ix_(felt, felt)] = inverse / np.outer(norm[felt], norm[felt])
+    return covariance
 
 
 def _starts(data: FitData) -> list[dict[str, float]]:

@@ -25,7 +25,7 @@ from ident.frequency_response import LEAST_SPEED_RATIO, FrequencyInertia
 from ident.friction_fit import DIRECTIONS, SIGN
 from ident.friction_map import MapPoint
 from ident.parameters import UNITS, Parameters, parameters
-from ident.weighting import Weighted, settle
+from ident.weighting import Weighted, settle, with_inertia
 from ident.withholding import require_enough
 
 COMPATIBLE = 3.0  # standard errors between two sources of the inertia
@@ -52,7 +52,7 @@ def identify(recordings: Sequence[Recording], *, free_beta: bool = False) -> Ide
     axis = _axis(recordings)
     evidence = gather(recordings)
     require_evidence(recordings, evidence)
-    weighted = settle(evidence, inertia=None, free_beta=free_beta)
+    weighted = settle(evidence, free_beta=free_beta)
     per_direction = 5 if free_beta else 4
     for direction in DIRECTIONS:
         require_enough(weighted.data, direction, parameters=per_direction)
@@ -68,9 +68,8 @@ def identify(recordings: Sequence[Recording], *, free_beta: bool = False) -> Ide
         if refusal is not None:
             notes.append(refusal)
         else:
-            weighted = settle(
-                evidence, inertia=(evidence.response.inertia, evidence.response.stderr), free_beta=free_beta
-            )
+            datum = (evidence.response.inertia, evidence.response.stderr)
+            weighted = with_inertia(evidence, weighted, datum, free_beta=free_beta)
             dof = _degrees(weighted)
         notes += _disagreement(sources, unit)
     values = parameters(weighted.data, weighted.fit, axis=axis, dof=dof)

@@ -50,8 +50,7 @@ class Parameters:
 
 def parameters(data: FitData, fit: FrictionFit, *, axis: Axis, dof: int) -> Parameters:
     """Values, errors and intervals in the law's own parameters."""
-    names, matrix = _physical_covariance(fit)
-    stderr = dict(zip(names, np.sqrt(np.diag(matrix)), strict=True))
+    names, matrix, stderr = _physical_covariance(fit)
     units = UNITS[axis]
     findings: list[Finding] = []
     curves: dict[Direction, Mapping[str, Estimate]] = {}
@@ -71,8 +70,12 @@ def parameters(data: FitData, fit: FrictionFit, *, axis: Axis, dof: int) -> Para
     )
 
 
-def _physical_covariance(fit: FrictionFit) -> tuple[tuple[str, ...], FloatArray]:
-    """Names 'inertia', 'positive.static_torque', ... and their covariance: F_s = F_c + dF instead of dF."""
+def _physical_covariance(fit: FrictionFit) -> tuple[tuple[str, ...], FloatArray, dict[str, float]]:
+    """Names 'inertia', 'positive.static_torque', ..., their covariance with F_s = F_c + dF, and standard
+    errors.
+
+    A parameter that the data do not feel has an infinite error and no place in the covariance.
+    """
     names = []
     transform = np.eye(len(fit.free))
     for row, name in enumerate(fit.free):
@@ -81,7 +84,11 @@ def _physical_covariance(fit: FrictionFit) -> tuple[tuple[str, ...], FloatArray]
             transform[row, fit.free.index(f"{direction}_coulomb_torque")] = 1.0
             parameter = "static_torque"
         names.append(f"{direction}.{parameter}" if parameter else name)
-    return tuple(names), np.asarray(transform @ fit.covariance @ transform.T)
+    lost = np.isinf(np.diag(fit.covariance))
+    matrix = np.asarray(transform @ np.where(np.isinf(fit.covariance), 0.0, fit.covariance) @ transform.T)
+    spread = np.where(lost, np.inf, np.sqrt(np.diag(matrix)))
+    kept = tuple(name for name, gone in zip(names, lost, strict=True) if not gone)
+    return kept, matrix[np.ix_(~lost, ~lost)], dict(zip(names, map(float, spread), strict=True))
 
 
 def _curve(

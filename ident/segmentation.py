@@ -118,7 +118,9 @@ def plateaus(recording: Recording, chain: tuple[Stretch, ...]) -> tuple[Stretch,
     Plateaus may be equal in duration or equal in travel; a transition is short in both.
     """
     still = REST_TRAVEL * grain(recording)
-    moving = [piece for piece in chain if abs(piece.travel) > still]
+    # A rest with a wrinkle of a few counts is no speed.
+    least = {True: 2.0 * still, False: still}
+    moving = [piece for piece in chain if abs(piece.travel) > least[_is_slow(piece, chain)]]
     if not moving:
         return ()
     duration = np.array([piece.duration for piece in moving])
@@ -169,9 +171,9 @@ def _without_weak_corners(
 ) -> list[int]:
     """Corners whose neighbours a single chord explains as well are dropped: greedy splitting leaves some."""
     kept = corners[:1]
-    for corner, after in itertools.pairwise(corners):
-        deviation = _deviation(time, position, kept[-1], after)
-        if float(np.max(deviation)) > max(least, BEND * abs(position[after] - position[kept[-1]])):
+    for corner, after in itertools.pairwise(corners[1:]):
+        deviation = float(np.max(_deviation(time, position, kept[-1], after), initial=0.0))
+        if deviation > max(least, BEND * abs(position[after] - position[kept[-1]])):
             kept.append(corner)
     return kept + corners[-1:]
 

@@ -8,7 +8,8 @@ which a slow run sees one phase only, and whatever differs from run to run. So
 
 w_i^2 the white part times one ratio pooled over all runs, tau the run-to-run spread, lambda the travel over
 which ripple averages out (infinite: it never does). tau and lambda are those under which the residuals of
-the fit are most likely, and the residuals are inflated for the parameters that they were fitted with.
+the fit are most likely, and the residuals are inflated for the parameters that they were fitted with. A
+finite lambda has to earn its place: it is the best of several tried, and it makes long runs look better.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from ident.friction_map import SteadyRun
 
 TRAVELS = 8  # candidates for lambda
 SPREADS = 60  # candidates for tau
+EARNED = 6.0  # by which twice the log likelihood must rise for a finite lambda
 FINEST = 1e-4  # least standard error, in parts of the torque: no torque sensor knows more
 
 
@@ -62,6 +64,7 @@ def run_spread(residual: FloatArray, travel: FloatArray, variance: FloatArray, p
             candidate = RunSpread(float(spread), float(wavelength))
             total = variance + candidate.variance(travel)
             cost = float(np.sum(inflated / total + np.log(total)))
+            cost += EARNED if np.isfinite(wavelength) and spread else 0.0
             if cost < least:
                 best, least = candidate, cost
     return best

@@ -44,16 +44,27 @@ class Weighted:
     spread: RunSpread
 
 
-def settle(evidence: Evidence, *, inertia: tuple[float, float] | None, free_beta: bool) -> Weighted:
-    """Fit, weigh anew, and fit again until the weights have settled."""
-    data = _first_data(evidence, inertia)
+def settle(evidence: Evidence, *, free_beta: bool) -> Weighted:
+    """Fit, weigh anew, and fit again until the weights have settled; from many starts first and last."""
+    data = _first_data(evidence)
     fit = fit_friction(data, free_beta=False)
     spread = RunSpread(0.0, np.inf)
     for number in range(ROUNDS):
         data, spread = _reweighted(evidence, data, fit)
-        last = number == ROUNDS - 1
-        fit = fit_friction(data, free_beta=free_beta, start=None if last or number == 0 else fit)
+        fit = fit_friction(data, free_beta=free_beta, start=None if number == ROUNDS - 1 else fit)
     return Weighted(data, fit, spread)
+
+
+def with_inertia(
+    evidence: Evidence, weighted: Weighted, inertia: tuple[float, float], *, free_beta: bool
+) -> Weighted:
+    """The settled fit with one datum more: an inertia and its standard error."""
+    data, fit, spread = replace(weighted.data, inertia=inertia), weighted.fit, weighted.spread
+    fit = fit_friction(data, free_beta=free_beta, start=fit)
+    for _ in range(2):
+        data, spread = _reweighted(evidence, data, fit)
+        fit = fit_friction(data, free_beta=free_beta, start=fit)
+    return Weighted(data, replace(fit, other_minimum=weighted.fit.other_minimum), spread)
 
 
 def fitted_robot(fit: FrictionFit) -> OneLinkRobot | None:
@@ -68,7 +79,7 @@ def fitted_robot(fit: FrictionFit) -> OneLinkRobot | None:
         return None
 
 
-def _first_data(evidence: Evidence, inertia: tuple[float, float] | None) -> FitData:
+def _first_data(evidence: Evidence) -> FitData:
     runs, starts = evidence.used_runs, evidence.used_starts
     run_direction = np.array([run.direction for run in runs], dtype=np.int64)
     start_direction = np.array([start.direction for start in starts], dtype=np.int64)
@@ -89,7 +100,7 @@ def _first_data(evidence: Evidence, inertia: tuple[float, float] | None) -> FitD
         whitening=tuple(
             _whitening(motion, 0.0, RunSpread(typical, np.inf), scale=1.0) for motion in evidence.momenta
         ),
-        inertia=inertia,
+        inertia=None,
     )
 
 

@@ -164,7 +164,7 @@ class Rig:
 
 
 def multisine(
-    *, period: float, length: int, amplitude: float, lines: Sequence[int], generator: np.random.Generator
+    *, length: int, amplitude: float, lines: Sequence[int], generator: np.random.Generator
 ) -> FloatArray:
     """One period (length,) of a random-phase multisine with the given root mean square [N m]."""
     phases = generator.uniform(0, 2 * np.pi, len(lines))
@@ -172,7 +172,6 @@ def multisine(
     wave = np.sum(
         [np.cos(2 * np.pi * k * t / length + p) for k, p in zip(lines, phases, strict=True)], axis=0
     )
-    del period
     return np.asarray(amplitude * wave / np.sqrt(np.mean(wave**2)), dtype=np.float64)
 
 

@@ -1,0 +1,81 @@
+"""F_s from ramps, with the delay of detection taken out; and starts that are no breakaway."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from data.recording import Recording
+from ident.breakaway import breakaways
+from ident.friction_fit import Direction
+from ident.response import breakaway_delay
+from tests.ident.rigs import Rig
+
+
+@pytest.mark.parametrize("counts", [2000, 20_000, 2**18, 2**20])
+@pytest.mark.parametrize("period", [1e-3, 5e-3])
+def test_static_torque_of_every_ramp_in_a_log_of_many(counts: int, period: float) -> None:
+    rig = Rig(resolution=2 * math.pi / counts, period=period, torque_noise=0.01)
+    rates = [0.05, -0.05, 0.2, -0.2, 0.1]
+    found = [start for start in breakaways(rig.ramps(rates, np.random.default_rng(1))) if start.why is None]
+    assert [start.direction for start in found] == [int(math.copysign(1, rate)) for rate in rates]
+    for start, rate in zip(found, rates, strict=True):
+        assert start.line.rate == pytest.approx(rate, rel=0.03)
+        direction: Direction = "positive" if rate > 0 else "negative"
+        delay = breakaway_delay(rig.robot, direction=direction, ramp_rate=abs(rate), travel=start.travel)
+        truth = (rig.robot.friction.positive if rate > 0 else rig.robot.friction.negative).static_torque
+        assert abs(start.torque) - abs(rate) * delay == pytest.approx(truth, abs=5 * start.line.stderr + 1e-3)
+
+
+def test_the_delay_matters_for_a_coarse_encoder() -> None:
+    rig = Rig(resolution=2 * math.pi / 2000, torque_noise=0.001)
+    (start, *_) = breakaways(rig.ramps([0.3], np.random.default_rng(2)))
+    assert start.torque > 1.03 * rig.robot.friction.positive.static_torque
+
+
+def test_a_breakaway_at_the_limit_is_censored() -> None:
+    rig = Rig(torque_limit=0.5)
+    found = breakaways(rig.ramps([0.2], np.random.default_rng(3)))
+    assert found
+    assert all(start.is_censored for start in found)
+    assert "F_s >= 0.5" in str(found[0].why)
+
+
+def test_a_step_of_torque_is_no_breakaway() -> None:
+    torque = np.concatenate([np.zeros(1000), np.full(800, 0.8), np.zeros(1500)])
+    recording = Rig().torque_driven(torque, np.random.default_rng(4), protocol="breakaway")
+    found = breakaways(recording)
+    assert found
+    assert all(start.why is not None for start in found)
+
+
+def test_creep_of_a_few_counts_is_no_breakaway() -> None:
+    recording = Rig().ramps([0.2], np.random.default_rng(5))
+    part = slice(0, int(2.0 / 1e-3))
+    ramp = recording.torque[part].copy()
+    count = recording.resolution or 0.0
+    position = np.round(np.linspace(0, 9, ramp.size) ** 2 / 81 * 9) * count
+    creeping = Recording(
+        log="creep",
+        protocol="breakaway",
+        time=recording.time[part].copy(),
+        position=position,
+        torque=ramp,
+        resolution=count,
+    )
+    found = breakaways(creeping)
+    assert [str(start.why)[:7] for start in found] == ["E-CREEP"]
+
+
+def test_pre_sliding_of_many_fine_counts_is_not_taken_for_the_onset() -> None:
+    recording = Rig(resolution=2 * math.pi / 2**20, torque_noise=0.002).ramps([0.1], np.random.default_rng(6))
+    smooth = np.convolve(recording.torque, np.full(200, 1 / 200), mode="same")
+    sliding = 2e-4 * np.clip(smooth / 0.57, 0.0, 1.0) ** 2
+    count = recording.resolution or 1.0
+    bent = replace(recording, position=np.round((recording.position + sliding) / count) * count)
+    found = [start for start in breakaways(bent) if start.why is None]
+    assert len(found) == 1
+    assert found[0].torque == pytest.approx(0.5735, rel=0.02)
