@@ -259,7 +259,9 @@ def test_a_withheld_parameter_is_3_and_everything_else_is_written(recorded: Path
     text = text[:start] + text[text.index("[[experiment]]", start + 1) :]
     path = tmp_path / "fast.toml"
     path.write_text(text, encoding="utf-8")
-    spoil(path, "[0.006, 0.015, 0.04, 0.1, 0.4, 1.5]", "[0.5, 0.6, 0.75, 0.9, 1.1, 1.4, 1.8, 2.4]")
+    spoil(
+        path, "[0.005, 0.012, 0.03, 0.07, 0.17, 0.4, 1.0, 2.5]", "[0.5, 0.6, 0.75, 0.9, 1.1, 1.4, 1.8, 2.4]"
+    )
     assert stribeck("record", path, "-q").exit_code == 0
     result = stribeck("run", path, "-o", tmp_path / "out")
     assert_refused(result, 3)
