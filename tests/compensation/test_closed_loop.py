@@ -1,0 +1,196 @@
+"""Inclusion (8): published reference numbers, closed forms, symmetries and independent solvers."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from compensation.closed_loop import ClosedLoop, simulate, torque
+from compensation.controller import Controller, Gains
+from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
+from ident.model.published import asymmetric_robot, symmetric_robot
+from ident.model.robot import OneLinkRobot
+from tests.compensation.independent_solvers import piecewise, time_stepping
+from tests.strategies import controllers, robots
+
+START = (1.0, 0.0, 0.0)
+
+
+def loop(r: float, observer: float = 73.5, robot: OneLinkRobot | None = None) -> ClosedLoop:
+    gains = Gains(proportional=0.4, derivative=0.02, observer=observer, compensation=r)
+    return ClosedLoop(robot or symmetric_robot(), Controller(gains, symmetric_robot()))
+
+
+def test_reference_state_and_crossing_times() -> None:
+    run = simulate(loop(1.1), START, duration=20.0, times=[20.0], tolerance=1e-13)
+    np.testing.assert_allclose(run.state[0], [-0.2789541574, -0.0151153949, -0.0589475742], atol=1e-9, rtol=0)
+    times = [event.time for event in run.events[:4]]
+    np.testing.assert_allclose(
+        times, [1.8652042302, 1.8667688890, 5.0568730815, 5.0584377403], atol=1e-9, rtol=0
+    )
+    kinds = [event.kind for event in run.events[:4]]
+    assert kinds == ["estimate reversal", "velocity reversal"] * 2
+    assert run.end_reason == "time reached"
+
+
+def test_reference_rest() -> None:
+    run = simulate(loop(0.95), START, duration=20.0, tolerance=1e-13)
+    assert run.end_reason == "equilibrium"
+    assert run.end_time == pytest.approx(0.93987614, abs=5e-9)
+    assert run.end_state[0] == pytest.approx(-0.108499373, abs=1e-9)
+    assert run.state[-1] == pytest.approx(run.end_state, abs=1e-12)
+
+
+def test_the_graze_regression_rests() -> None:
+    start = (-0.07271005559331459, 0.3843279159023869, -0.47829760675166744)
+    run = simulate(loop(0.9999), start, duration=20.0, tolerance=1e-13)
+    assert run.end_reason == "equilibrium"
+    assert run.end_state[0] == pytest.approx(-0.00110347505, abs=1e-9)
+
+
+@pytest.mark.parametrize("observer", [20.0, 40.0, 73.5, 120.0])
+def test_without_observer_error_r_1_is_the_linear_oscillator_bit_for_bit(observer: float) -> None:
+    time = np.linspace(0.0, 20.0, 401)
+    run = simulate(loop(1.0, observer), START, duration=20.0, times=time, tolerance=1e-13)
+    robot = symmetric_robot()
+    b = robot.friction.positive.viscous_damping
+    s = -(b + 0.02) / (2 * robot.inertia)
+    w = math.sqrt(0.4 / robot.inertia - s * s)
+    assert (s, w) == pytest.approx((-1.940384615, 3.408742133), abs=1e-8)
+    np.testing.assert_allclose(
+        run.state[:, 0], np.exp(s * time) * (np.cos(w * time) - s / w * np.sin(w * time)), atol=1e-12
+    )
+    assert np.all(run.state[:, 2] == 0.0)
+
+
+@pytest.mark.parametrize("shape", [0.7, 1.0, 1.5, 2.0])
+def test_observer_error_zero_is_invariant_for_any_shape_and_asymmetric_law_known_exactly(
+    shape: float,
+) -> None:
+    friction = asymmetric_robot().friction
+    known = OneLinkRobot(
+        0.026,
+        StribeckFriction(
+            replace(friction.positive, stribeck_shape=shape), replace(friction.negative, stribeck_shape=shape)
+        ),
+    )
+    gains = Gains(proportional=0.4, derivative=0.02, observer=40.0, compensation=1.0)
+    run = simulate(ClosedLoop(known, Controller(gains, known)), (0.7, -0.3, 0.0), duration=5.0)
+    assert np.all(run.state[:, 2] == 0.0)
+
+
+@given(robots(), controllers(), st.tuples(*[st.floats(-1.0, 1.0)] * 3))
+@settings(max_examples=25, deadline=None)
+def test_mirrored_laws_mirror_the_motion_bit_for_bit(
+    robot: OneLinkRobot, controller: Controller, start: tuple[float, float, float]
+) -> None:
+    def mirrored(robot: OneLinkRobot) -> OneLinkRobot:
+        return replace(robot, friction=StribeckFriction(robot.friction.negative, robot.friction.positive))
+
+    here = simulate(ClosedLoop(robot, controller), start, duration=2.0, times=[1.0, 2.0])
+    there = simulate(
+        ClosedLoop(mirrored(robot), replace(controller, model=mirrored(controller.model))),
+        [-x for x in start],
+        duration=2.0,
+        times=[1.0, 2.0],
+    )
+    np.testing.assert_array_equal(there.state, -here.state)
+    assert [event.kind for event in there.events] == [event.kind for event in here.events]
+
+
+def random_loop(seed: int) -> tuple[ClosedLoop, tuple[float, float, float]]:
+    random = np.random.default_rng(seed)
+
+    def robot() -> OneLinkRobot:
+        curves = [
+            StribeckCurve(
+                static_torque=float(coulomb + random.uniform(0.0, 0.3)),
+                coulomb_torque=float(coulomb),
+                stribeck_velocity=float(random.uniform(0.03, 0.2)),
+                viscous_damping=float(random.uniform(0.0, 0.2)),
+                stribeck_shape=float(random.choice([1.0, 1.0, 1.3, 2.0])),
+            )
+            for coulomb in random.uniform(0.2, 0.6, 2)
+        ]
+        return OneLinkRobot(float(random.uniform(0.01, 0.05)), StribeckFriction(*curves))
+
+    gains = Gains(
+        proportional=float(random.uniform(0.2, 2.0)),
+        derivative=float(random.uniform(0.0, 0.1)),
+        observer=float(random.uniform(20.0, 120.0)),
+        compensation=float(random.uniform(0.5, 1.4)),
+    )
+    x1, x2, x3 = map(float, random.normal(size=3))
+    return ClosedLoop(robot(), Controller(gains, robot())), (x1, x2, x3)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_agrees_with_scipy_from_event_to_event(seed: int) -> None:
+    case, start = random_loop(seed)
+    run = simulate(case, start, duration=3.0, times=[3.0], tolerance=1e-12)
+    np.testing.assert_allclose(run.state[0], piecewise(case, start, 3.0), atol=1e-7)
+
+
+@pytest.mark.parametrize("seed", [2, 5])
+def test_implicit_time_stepping_converges_to_it_at_first_order(seed: int) -> None:
+    case, start = random_loop(seed)
+    exact = simulate(case, start, duration=1.0, times=[1.0], tolerance=1e-12).state[0]
+    errors = [float(np.max(np.abs(time_stepping(case, start, 1.0, n) - exact))) for n in (4000, 16000)]
+    assert errors[1] < 5e-3
+    assert errors[1] < 0.5 * errors[0]
+
+
+@given(robots(), controllers(), st.tuples(*[st.floats(-1.0, 1.0)] * 3))
+@settings(max_examples=100, deadline=None)
+def test_every_end_reason_is_true(
+    robot: OneLinkRobot, controller: Controller, start: tuple[float, float, float]
+) -> None:
+    case = ClosedLoop(robot, controller)
+    run = simulate(case, start, duration=5.0, times=np.linspace(0.0, 5.0, 11))
+    assert run.end_reason in ("time reached", "equilibrium")
+    assert np.all(np.isfinite(run.state))
+    if run.end_reason == "equilibrium":
+        again = simulate(case, run.end_state, duration=5.0)
+        assert again.end_reason == "equilibrium"
+        assert again.end_time <= 1e-6 or again.end_state[0] == pytest.approx(run.end_state[0], rel=1e-9)
+        assert float(torque(case, run.end_state)[0]) <= robot.friction.positive.static_torque * (1 + 1e-9)
+        assert float(torque(case, run.end_state)[0]) >= -robot.friction.negative.static_torque * (1 + 1e-9)
+    else:
+        halfway = simulate(case, start, duration=2.5)
+        if halfway.end_reason == "time reached":
+            rest = simulate(case, halfway.end_state, duration=2.5)
+            np.testing.assert_allclose(rest.end_state, run.end_state, atol=1e-5)
+
+
+def test_torque_is_the_control_law() -> None:
+    case = loop(1.1, robot=asymmetric_robot())
+    law = symmetric_robot().friction.positive
+    u = torque(case, [[0.2, 0.1, 0.0], [0.2, -0.1, 0.3], [0.2, 0.0, 0.0]])
+    compensation = 1.1 * float(law.dry(0.1))
+    np.testing.assert_allclose(u, [-0.082 + compensation, -0.078 - compensation, -0.08])
+
+
+def test_the_set_point_is_an_equilibrium_for_any_gain() -> None:
+    run = simulate(loop(1.3), (0.0, 0.0, 0.0), duration=1.0)
+    assert run.end_reason == "equilibrium"
+    assert np.all(run.state == 0.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ({"start": (1.0, math.nan, 0.0)}, "start"),
+        ({"start": (1.0, 0.0)}, "start"),
+        ({"duration": -1.0}, "duration"),
+        ({"times": [2.0, 1.0]}, "ascend"),
+        ({"times": [0.0, 9.0]}, "ascend"),
+        ({"tolerance": 0.0}, "tolerance"),
+    ],
+)
+def test_bad_input_is_named(arguments: dict[str, object], said: str) -> None:
+    given: dict[str, object] = {"start": START, "duration": 3.0, **arguments}
+    with pytest.raises(ModelError, match=said):
+        simulate(loop(1.0), **given)  # type: ignore[arg-type]  # wrong on purpose

@@ -1,0 +1,47 @@
+"""The kernel cache: loads in a second process, and never answers with stale code."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+LOW = """
+from ident.simulation.compiled import compiled, specialised
+SCALE = {scale}
+@compiled
+def scaled(x):
+    return SCALE * x
+@specialised
+def applied(function, x):
+    return function(x) + 1.0
+"""
+HIGH = """
+import warnings
+warnings.simplefilter("error")
+from ident.simulation.compiled import compiled, passed
+from low import applied, scaled
+FUNCTION = passed(scaled)
+@compiled
+def top(x):
+    return applied(FUNCTION, x)
+print(top(1.0), sum(top.stats.cache_hits.values()))
+"""
+
+
+def run(folder: Path) -> tuple[float, int]:
+    root = Path(__file__).parents[3]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(root), str(folder)])}
+    out = subprocess.run(
+        [sys.executable, "high.py"], cwd=folder, env=environment, capture_output=True, text=True, check=True
+    ).stdout
+    value, hits = out.split()
+    return float(value), int(hits)
+
+
+def test_a_second_process_loads_and_an_edit_of_a_called_module_recompiles(tmp_path: Path) -> None:
+    (tmp_path / "high.py").write_text(HIGH)
+    (tmp_path / "low.py").write_text(LOW.format(scale=2.0))
+    assert run(tmp_path) == (3.0, 0)
+    assert run(tmp_path) == (3.0, 1)
+    (tmp_path / "low.py").write_text(LOW.format(scale=5.0))
+    assert run(tmp_path) == (6.0, 0)

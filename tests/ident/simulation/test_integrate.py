@@ -1,0 +1,116 @@
+"""The event loop on a second system, a mass on a spring with dry friction, whose solution is closed form.
+
+x' = v, v' = -x - mu sign(v), held while |x| <= mu: half turns are half circles about -+mu, each 2 mu shorter
+than the last, until the mass rests.
+"""
+
+from typing import Final
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from ident.simulation.compiled import compiled, passed
+from ident.simulation.dormand_prince import DORMAND_PRINCE
+from ident.simulation.filippov_system import FilippovSystem, FloatArray, Signs, Surfaces
+from ident.simulation.integrate import EQUILIBRIUM, TIME_REACHED, Progress, Record, Settings, integrate
+from ident.simulation.taylor import TAYLOR
+
+MU: Final = 0.1
+
+
+@compiled
+def field(signs: Signs, state: FloatArray, parameters: FloatArray, out: FloatArray) -> None:
+    out[0] = state[1]
+    out[1] = -state[0] - parameters[0] * signs[0]
+
+
+@compiled
+def series(
+    signs: Signs, state: FloatArray, parameters: FloatArray, order: int, c: FloatArray, work: FloatArray
+) -> None:
+    c[0, 0], c[1, 0] = state[0], state[1]
+    for k in range(order):
+        c[0, k + 1] = c[1, k] / (k + 1)
+        c[1, k + 1] = (-c[0, k] - (parameters[0] * signs[0] if k == 0 else 0.0)) / (k + 1)
+
+
+@compiled
+def slide(signs: Signs, state: FloatArray, parameters: FloatArray) -> tuple[float, int, int, int]:
+    return np.inf, 0, 0, 0
+
+
+@compiled
+def slide_at(signs: Signs, state: FloatArray, parameters: FloatArray, time: float, out: FloatArray) -> None:
+    out[0], out[1] = state[0], 0.0
+
+
+SYSTEM = FilippovSystem(passed(field), passed(series), passed(slide), passed(slide_at))
+ROWS = np.array([[0.0, 1.0, 0.0]])
+PIVOTS = np.array([1])
+
+
+@compiled
+def by_series(
+    mu: FloatArray, settings: Settings, state: FloatArray, signs: Signs, contact: Signs, record: Record
+) -> Progress:
+    return integrate(TAYLOR, SYSTEM, Surfaces(ROWS, PIVOTS), mu, settings, 0.0, state, signs, contact, record)
+
+
+@compiled
+def by_dormand_prince(
+    mu: FloatArray, settings: Settings, state: FloatArray, signs: Signs, contact: Signs, record: Record
+) -> Progress:
+    return integrate(
+        DORMAND_PRINCE, SYSTEM, Surfaces(ROWS, PIVOTS), mu, settings, 0.0, state, signs, contact, record
+    )
+
+
+def exact(time: FloatArray, start: float) -> tuple[NDArray[np.float64], float, float]:
+    """x(t) from rest at `start` > mu; when and where it rests."""
+    x = np.empty_like(time)
+    begin, at, half = 0.0, start, 0
+    while abs(at) > MU:
+        centre = MU * np.sign(at)
+        inside = (time >= begin) & (time <= begin + np.pi)
+        x[inside] = centre + (at - centre) * np.cos(time[inside] - begin)
+        at = 2 * centre - at
+        begin += np.pi
+        half += 1
+    x[time > begin] = at
+    return x, begin, at
+
+
+@pytest.mark.parametrize("run", [by_series, by_dormand_prince])
+@pytest.mark.parametrize("start", [1.0, 0.55, 0.11])
+def test_dry_friction_oscillator(run: object, start: float) -> None:
+    assert callable(run)
+    time = np.linspace(0.0, 20.0, 301)
+    events = 32
+    record = Record(
+        time, np.empty((301, 2)), np.empty(events), np.empty(events, np.int64),
+        np.empty((events, 1), np.int64), np.empty((events, 2)),
+    )  # fmt: skip
+    state, signs, contact = np.array([start, 0.0]), np.array([-1]), np.array([1])
+    end = run(np.array([MU]), Settings(1e-12, 20.0, 10_000, -1, 0, 0), state, signs, contact, record)
+    x, rests_at, rest = exact(time, start)
+    assert end.reason == EQUILIBRIUM
+    assert end.time == pytest.approx(rests_at, abs=1e-10)
+    assert state[0] == pytest.approx(rest, abs=1e-10)
+    np.testing.assert_allclose(record.states[:, 0], x, atol=1e-9)
+    np.testing.assert_allclose(
+        record.event_times[: end.events], np.pi * np.arange(1, end.events + 1), atol=1e-10
+    )
+
+
+@pytest.mark.parametrize("run", [by_series, by_dormand_prince])
+def test_without_friction_energy_is_kept(run: object) -> None:
+    assert callable(run)
+    none = Record(
+        np.empty(0), np.empty((0, 2)), np.empty(0), np.empty(0, np.int64), np.empty((0, 1), np.int64),
+        np.empty((0, 2)),
+    )  # fmt: skip
+    state, signs, contact = np.array([1.0, 0.0]), np.array([-1]), np.array([1])
+    end = run(np.array([0.0]), Settings(1e-13, 100.0, 100_000, -1, 0, 0), state, signs, contact, none)
+    assert end.reason == TIME_REACHED
+    assert state == pytest.approx([np.cos(100.0), -np.sin(100.0)], abs=1e-9)
