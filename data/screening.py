@@ -307,7 +307,7 @@ def require_torque_sign(run: Signals, resolution: float | None) -> None:
     way = np.diff(run.position)
     if float(np.sum(np.abs(way))) < 200.0 * (resolution or 0.0) + 1e-12:
         return
-    power = 0.5 * (run.torque[1:] + run.torque[:-1]) * way
+    power = run.torque[:-1] * way  # a sample is held until the next: a loop that chatters shows it
     size = float(np.sum(np.abs(power)))
     share = float(np.sum(power)) / size if size > 0.0 else 0.0
     if share > -0.6:

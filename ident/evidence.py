@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from data.findings import Finding, LogError, Severity
 from data.protocols import IDENTIFIES, ProtocolName
@@ -12,6 +14,7 @@ from ident.breakaway import Breakaway, breakaways
 from ident.estimate import RunUse
 from ident.frequency_response import FrequencyInertia, frequency_inertia
 from ident.friction_map import SteadyRun, steady_runs
+from ident.hunting import SAMPLES, hunts, sensor_noise
 from ident.momentum import Momentum, momentum
 
 
@@ -54,7 +57,41 @@ def gather(recordings: Sequence[Recording]) -> Evidence:
             motions = (momentum(recording, start) for start in own if start.why is None)
             momenta += [motion for motion in motions if motion is not None]
     response, reasons = frequency_inertia(_of(recordings, "frequency_response"))
-    return Evidence(tuple(runs), tuple(starts), tuple(momenta), response, reasons)
+    inertia = response.inertia if response is not None else _rough_inertia(runs, momenta)
+    steady = tuple(runs) if inertia is None else _without_hunting(recordings, runs, inertia)
+    return Evidence(steady, tuple(starts), tuple(momenta), response, reasons)
+
+
+def _rough_inertia(runs: Sequence[SteadyRun], momenta: Sequence[Momentum]) -> float | None:
+    """J within a factor of two, from the motion after breakaway with the typical torque as friction."""
+    torques = [abs(run.torque) for run in runs if run.why is None]
+    if not torques or not momenta:
+        return None
+    friction = float(np.median(torques))
+    found = [float((m.impulse - friction * m.duration).sum() / m.gain.sum()) for m in momenta]
+    typical = float(np.median(found))
+    return typical if typical > 0 else None
+
+
+def _without_hunting(
+    recordings: Sequence[Recording], runs: Sequence[SteadyRun], inertia: float
+) -> tuple[SteadyRun, ...]:
+    """The runs, those in which the speed loop hunts left out with the reason (`ident.hunting`)."""
+    logs = [*_of(recordings, "constant_velocity"), *_of(recordings, "breakaway")]
+    noise = sensor_noise([recording.torque for recording in logs]) if logs else 0.0
+    kept = []
+    for run in runs:
+        speed, torque = abs(run.velocity), abs(run.torque)
+        if run.why is None and hunts(run.swing, speed=speed, torque=torque, inertia=inertia, noise=noise):
+            why = (
+                f"E-STICKSLIP: the torque swings by {run.swing.torque**0.5:.3g} about {torque:.3g} within "
+                f"{SAMPLES} samples, enough to stop a link of this inertia at {speed:.3g}: the speed loop "
+                "hunts from count to count, and the mean torque is not the friction at the mean speed. Use a "
+                "finer encoder or a softer loop."
+            )
+            run = replace(run, why=why)  # noqa: PLW2901  (the same run with its reason)
+        kept.append(run)
+    return tuple(kept)
 
 
 def require_evidence(recordings: Sequence[Recording], evidence: Evidence) -> None:

@@ -25,6 +25,7 @@ import numpy as np
 
 from data.protocols import ProtocolName
 from data.recording import FloatArray, Recording
+from ident.hunting import Swing, swing
 from ident.segmentation import Stretch, grain, plateaus, rests, stretches
 
 LEAST_COUNTS = 20.0
@@ -63,6 +64,7 @@ class SteadyRun:
     white_stderr: float  # of the mean torque, were the samples' scatter all [N m]
     block_ratio: float  # variance of block means over what white scatter gives them
     travel: float  # [rad], > 0
+    swing: Swing  # of the torque within the run
     start_time: float  # [s]
     end_time: float  # [s]
     why: str | None = None  # why it is left out, beginning with its code
@@ -153,6 +155,7 @@ def _measure(recording: Recording, window: Stretch) -> SteadyRun:
         white_stderr=float(np.sqrt(scatter / torque.size)),
         block_ratio=_block_ratio(torque, scatter),
         travel=abs(_travel(recording, window.first, window.last)),
+        swing=swing(recording, window),
         start_time=float(time[0]),
         end_time=float(time[-1]),
     )

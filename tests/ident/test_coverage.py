@@ -11,6 +11,7 @@ from data.recording import FloatArray
 from ident.breakaway import Breakaway, RampLine
 from ident.evidence import Evidence
 from ident.friction_map import SteadyRun
+from ident.hunting import Swing
 from ident.model.published import asymmetric_robot
 from ident.parameters import parameters
 from ident.weighting import settle
@@ -30,6 +31,7 @@ def _run(velocity: float, torque: float, white: float) -> SteadyRun:
         white_stderr=white,
         block_ratio=1.0,
         travel=5.0 * abs(velocity),
+        swing=Swing(0.0, 0.0, 1e-3),
         start_time=0.0,
         end_time=5.0,
     )
