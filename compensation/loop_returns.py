@@ -20,9 +20,9 @@ from compensation.loop_modes import MOTION, SURFACE_ROWS, SYSTEM, surfaces
 from compensation.loop_runs import begin
 from compensation.loop_tangents import DEVIATIONS, STATES, TANGENTS, stick_deviations
 from compensation.orbits.saltation import carry, project_along, saltate
-from ident.simulation.compiled import compiled, specialised
+from ident.simulation.compiled import compiled, inlined
 from ident.simulation.dormand_prince import DORMAND_PRINCE
-from ident.simulation.filippov_system import FloatArray, OneStepMethod, Signs
+from ident.simulation.filippov_system import FloatArray, OneStepMethod, Signs, assign
 from ident.simulation.integrate import SECTION, WORK_ROWS, Progress, Record, Settings, integrate
 from ident.simulation.taylor import MAX_ORDER, TAYLOR
 
@@ -30,7 +30,7 @@ EVENT_STORE: Final = 256  # of a half turn: chattering beyond that is reported a
 STEP_LIMIT: Final = 200_000
 
 
-@specialised
+@inlined
 def _to_halt(
     method: OneStepMethod,
     parameters: FloatArray,
@@ -52,7 +52,7 @@ def _to_halt(
     return integrate(method, SYSTEM, surfaces(), parameters, settings, 0.0, state, signs, contact, record)
 
 
-@specialised
+@inlined
 def _returns(
     method: OneStepMethod,
     parameters: FloatArray,
@@ -62,7 +62,8 @@ def _returns(
     start: FloatArray,
     points: FloatArray,
 ) -> tuple[int, int]:
-    state = start.copy()
+    state = np.empty(STATES)
+    assign(state, start)
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     times, states = np.empty(0), np.empty((0, STATES))
     which, modes = np.empty(0, np.int64), np.empty((0, 2), np.int64)
@@ -90,7 +91,7 @@ def _returns(
     return points.shape[0], SECTION
 
 
-@specialised
+@inlined
 def _derivative(
     method: OneStepMethod,
     parameters: FloatArray,
@@ -102,9 +103,10 @@ def _derivative(
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     begin(parameters, state, signs, contact)
     y = np.zeros(STATES * (1 + DEVIATIONS))
-    y[:STATES] = state
+    assign(y, state)
     y[3], y[7], y[8] = 1.0, 1.0, -1.0  # deviations within the section: by x1, and by x2 = -x3
-    mode = signs.copy()
+    mode = np.empty(2, np.int64)
+    assign(mode, signs)
     times, which = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64)
     modes, states = np.empty((EVENT_STORE, 2), np.int64), np.empty((EVENT_STORE, STATES))
     end = _to_halt(
@@ -123,7 +125,7 @@ def _derivative(
             stick_deviations(deviations, mode[0], parameters, span)
         else:
             carry(method, TANGENTS, parameters, mode, y, span, tolerance, polynomials, work)
-        y[:STATES] = states[event]
+        assign(y, states[event])
         normal = SURFACE_ROWS[which[event], :STATES]
         _rate(parameters, mode, states[event], before)
         if event == end.events - 1:
@@ -131,7 +133,7 @@ def _derivative(
         elif mode[MOTION] != 0 or which[event] != MOTION:
             _rate(parameters, modes[event], states[event], after)
             saltate(deviations, before, after, normal)
-        mode[:] = modes[event]
+        assign(mode, modes[event])
         now = times[event]
     for i in range(DEVIATIONS):
         out[0, i], out[1, i] = deviations[i, 0], deviations[i, 1]
@@ -144,7 +146,8 @@ def _rate(parameters: FloatArray, mode: Signs, state: FloatArray, out: FloatArra
     if mode[MOTION] != 0:
         SYSTEM.field(mode, state, parameters, out)
         return
-    slipping = mode.copy()
+    slipping = np.empty(2, np.int64)
+    slipping[0] = mode[0]
     slipping[MOTION] = slipping[0] if slipping[0] != 0 else 1
     SYSTEM.field(slipping, state, parameters, out)
     out[0] = 0.0

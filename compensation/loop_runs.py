@@ -22,8 +22,11 @@ SLIP_MODES: Final = 4
 @compiled
 def is_analytic(parameters: FloatArray) -> bool:
     """Whether every slip mode has a Taylor recurrence."""
-    shapes = parameters[:SLIP_MODES]
-    return bool(np.all(shapes[:, SHAPE2] == 1.0) and np.all(shapes[:, SHAPEV] == 1.0))
+    others = 0
+    for mode in range(SLIP_MODES):
+        if parameters[mode, SHAPE2] != 1.0 or parameters[mode, SHAPEV] != 1.0:
+            others += 1
+    return others == 0
 
 
 @compiled
@@ -33,9 +36,11 @@ def begin(parameters: FloatArray, state: FloatArray, signs: Signs, contact: Sign
     The origin is an equilibrium for any gains: its friction torques may take any value up to break-away, zero
     included. (For r > 1 it is not the only solution from there; it is the one without a push.)
     """
-    contact[:] = 0
+    for i in range(contact.size):
+        contact[i] = 0
     if state[0] == 0.0 and state[1] == 0.0 and state[2] == 0.0:
-        signs[:] = 0
+        for i in range(signs.size):
+            signs[i] = 0
         return
     on = surfaces()
     rate = np.empty(state.size)

@@ -28,6 +28,7 @@ FIRST_LOOK: Final = 3
 LATER_LOOKS: Final = 24
 SAME: Final = 1e-11  # relative distance of points that are the same
 NEWTON_STEPS: Final = 12
+SAME_POINT: Final = 1e-7  # relative distance of points of a converged cycle that are one
 VANISHED: Final = 1e-9  # of the start: what has become as small decays
 NEAR: Final = 1e-3  # relative distance from which shooting is tried
 
@@ -121,11 +122,15 @@ def shoot(section: ReturnMap, guess: FloatArray, returns: int) -> Cycle | NoCycl
 
 
 def cycle_at(section: ReturnMap, point: FloatArray, returns: int) -> Cycle | NoCycle:
-    """The cycle through a fixed point (d,) of the map's iterate."""
+    """The cycle through a fixed point (d,) of the map's iterate, the point corrected by one Newton step."""
     done = section.follow(point, returns)
+    fewer = _repeats(np.concatenate([done.points[-1:], done.points]), SAME_POINT)
+    if done.end_reason == "section reached" and 0 < fewer < returns:
+        return cycle_at(section, point, fewer)
     slope = _slope(section, point, returns)
     if done.end_reason != "section reached" or slope is None:
         return NoCycle(done.end_reason)
+    point = point + np.linalg.solve(np.eye(point.size) - slope, done.points[-1] - point)
     period = float(np.sum(done.durations))
     low, high = float(np.min(done.lows)), float(np.max(done.highs))
     if section.symmetric:

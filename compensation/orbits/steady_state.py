@@ -15,6 +15,7 @@ counts that flicker at rest are no cycle, and a cycle of ten counts is one.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from typing import Final, Literal
@@ -67,7 +68,7 @@ def classify(
         return _undecided(f"too short: {t.size} samples, at least {FEWEST_SAMPLES} are needed")
     smooth, band = _without_noise(error, resolution)
     turns = _Turns.of(t, smooth, band)
-    return _rest(t, smooth, band, turns) or _cycle(t, error, band, turns)
+    return _rest(t, smooth, band, turns) or _cycle(t, error, smooth, band, turns)
 
 
 def _undecided(why: str) -> SteadyState:
@@ -182,7 +183,7 @@ def _rest(t: FloatArray, smooth: FloatArray, band: float, turns: _Turns) -> Stea
     return SteadyState("equilibrium", place, None, None, f"at rest for the last {lasted:.3g} s")
 
 
-def _cycle(t: FloatArray, error: FloatArray, band: float, turns: _Turns) -> SteadyState:
+def _cycle(t: FloatArray, error: FloatArray, smooth: FloatArray, band: float, turns: _Turns) -> SteadyState:
     if turns.time.size < 4:
         return _too_few_turns(t, error, band, turns)
     tops, bottoms = turns.value[-1::-2][::-1], turns.value[-2::-2][::-1]
@@ -207,7 +208,7 @@ def _cycle(t: FloatArray, error: FloatArray, band: float, turns: _Turns) -> Stea
     drift, certain = _trend(middles[-settled:] / last)
     if settled >= 4 and abs(drift) > TREND and certain:
         return _undecided(f"drifting: the middle moves by {drift * last:.3g} rad a turn")
-    period = _period(turns.time, settled)
+    period = _period(t, smooth, turns.time[-2 * settled :], float(np.median(middles[-settled:])))
     amplitude = float(np.max(np.abs(error[t >= t[-1] - period])))
     return SteadyState(
         "limit_cycle", None, amplitude, period, f"{settled} turns of {period:.3g} s repeat at the end"
@@ -236,8 +237,16 @@ def _trend(values: FloatArray) -> tuple[float, bool]:
     return slope, abs(slope) > 3.0 * stderr
 
 
-def _period(times: FloatArray, settled: int) -> float:
-    """Mean time of a full turn over the settled ones, from both kinds of extremes."""
-    last = times[-2 * settled :]
-    full = last[2:] - last[:-2]
-    return float(np.mean(full))
+def _period(t: FloatArray, smooth: FloatArray, extremes: FloatArray, middle: float) -> float:
+    """Mean time of a full turn, between passages through the middle: extremes may be long and flat.
+
+    `extremes` (2 k,) are the times of those of the settled turns, tops and bottoms in turn.
+    """
+    passages = []
+    for begin, end in itertools.pairwise(extremes):
+        inside = np.flatnonzero((t >= begin) & (t <= end))
+        rises = smooth[inside[-1]] > smooth[inside[0]]
+        beyond = smooth[inside] >= middle if rises else smooth[inside] <= middle
+        passages.append(t[inside[int(np.argmax(beyond))]])
+    times = np.array(passages)
+    return float(np.mean(times[2:] - times[:-2])) if times.size > 2 else 2.0 * float(times[-1] - times[0])

@@ -56,6 +56,11 @@ def specialised(function: Callable[P, R]) -> Callable[P, R]:
     return numba.njit(error_model="numpy", nogil=True)(function)
 
 
+def inlined(function: Callable[P, R]) -> Callable[P, R]:
+    """As `specialised`, for a thin layer that is not worth machine code of its own."""
+    return numba.njit(error_model="numpy", nogil=True, inline="always")(function)
+
+
 def passed(kernel: Callable[P, R]) -> Callable[P, R]:
     """A kernel as an argument for `specialised` kernels."""
     return cast("Callable[P, R]", _Passed(kernel))

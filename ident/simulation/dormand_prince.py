@@ -120,7 +120,8 @@ def _dense(state: FloatArray, work: FloatArray, length: float, polynomials: Floa
     for i in range(state.size):
         end = work[STAGES + 1, i]
         p = polynomials[i]
-        p[: DEGREE + 1] = 0.0
+        for k in range(DEGREE + 1):
+            p[k] = 0.0
         for level in range(DEGREE):
             term = DEGREE - 1 - level
             if term == 0:
@@ -161,7 +162,8 @@ def repeat_to_event(
     end = np.empty(n)
     for _ in range(EVENT_CORRECTIONS):
         dormand_prince_step(system, signs, state, parameters, 1.0, -at, 0.0, polynomials, work)
-        end[:] = work[STAGES + 1, :n]
+        for j in range(n):
+            end[j] = work[STAGES + 1, j]
         value = switching_value(surfaces, surface, end)
         rate = 0.0
         for j in range(n):

@@ -21,12 +21,12 @@ tangentially. Without it, rounding would find the surface again and again at the
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ident.simulation.compiled import specialised
+from ident.simulation.compiled import compiled, specialised
 
 FloatArray = NDArray[np.float64]
 Signs = NDArray[np.int64]
@@ -66,6 +66,13 @@ class Surfaces(NamedTuple):
 
     rows: FloatArray  # (m, n + 1)
     pivots: Signs  # (m,) the state that is solved for when a state is put onto the surface
+
+
+@compiled
+def assign(out: NDArray[Any], values: NDArray[Any]) -> None:
+    """out[:] = values, without the code for broadcasting that numba would compile into every kernel."""
+    for i in range(values.size):
+        out[i] = values[i]
 
 
 @specialised
@@ -137,7 +144,9 @@ def resolve(
     if plus == 0.0 and minus == 0.0:
         for side in (1, -1):
             leaving_rate(system, surfaces, index, side, signs, state, parameters, rate)
-            ahead = state + TANGENT_STEP * rate
+            ahead = np.empty(state.size)
+            for j in range(state.size):
+                ahead[j] = state[j] + TANGENT_STEP * rate[j]
             if side * leaving_rate(system, surfaces, index, side, signs, ahead, parameters, rate) > 0.0:
                 return side
     return 0
@@ -169,4 +178,4 @@ def no_slide_at(
     signs: Signs, state: FloatArray, parameters: FloatArray, time: float, out: FloatArray
 ) -> None:
     """Goes with `no_slide`."""
-    out[:] = state
+    assign(out, state)

@@ -27,6 +27,7 @@ from ident.simulation.filippov_system import (
     OneStepMethod,
     Signs,
     Surfaces,
+    assign,
     leaving_rate,
     project,
     resolve,
@@ -107,9 +108,11 @@ def integrate(
     n, m = state.size, signs.size
     polynomials = np.empty((n + m, MAX_ORDER + 1))
     work = np.empty((WORK_ROWS, max(n, MAX_ORDER + 1)))
-    after = np.empty(n)
+    after, rate = np.empty(n), np.empty(n)
     wanted = record.times.size
-    output = int(np.searchsorted(record.times, time))
+    output = 0
+    while output < wanted and record.times[output] < time:
+        output += 1
     events = 0
     found = 0
     stalled = 0
@@ -130,16 +133,16 @@ def integrate(
                 output += 1
             if duration == np.inf:
                 system.slide_at(signs, state, parameters, np.inf, after)
-                state[:] = after
+                assign(state, after)
                 return Progress(time, EQUILIBRIUM, output, events, step)
             system.slide_at(signs, state, parameters, span, after)
-            state[:] = after
+            assign(state, after)
             stalled = stalled + 1 if time + span == time else 0
             if duration > left:
                 time = settings.end
                 continue
             time += span
-            _release(system, surfaces, parameters, surface, side, touching, state, signs, contact, work[0])
+            _release(system, surfaces, parameters, surface, side, touching, state, signs, contact, rate)
         else:
             length, degree, suggested = method.step(
                 system, signs, state, parameters, settings.tolerance, left, suggested, polynomials, work
@@ -166,20 +169,20 @@ def integrate(
             evaluate(polynomials, n, degree, part, after)
             stalled = stalled + 1 if now == time else 0
             time = now
-            state[:] = after
+            assign(state, after)
             for i in range(m):
                 contact[i] = 0
             if surface < 0:
                 continue
             arrived_from = signs[surface]
-            _meet(system, surfaces, parameters, surface, state, signs, contact, work[0])
+            _meet(system, surfaces, parameters, surface, state, signs, contact, rate)
             if signs[surface] == arrived_from:
-                _hold(system, surfaces, parameters, surface, state, signs, contact, work[0])
+                _hold(system, surfaces, parameters, surface, state, signs, contact, rate)
         if events < record.event_times.size:
             record.event_times[events] = time
             record.event_surfaces[events] = surface
-            record.event_signs[events] = signs
-            record.event_states[events] = state
+            assign(record.event_signs[events], signs)
+            assign(record.event_states[events], state)
             events += 1
             if events == record.event_times.size:
                 return Progress(time, EVENTS_FULL, output, events, step + 1)
@@ -193,7 +196,11 @@ def integrate(
 
 @compiled
 def _slides(signs: Signs) -> bool:
-    return bool(np.any(signs == 0))
+    sliding = 0
+    for i in range(signs.size):
+        if signs[i] == 0:
+            sliding += 1
+    return sliding > 0
 
 
 @compiled
@@ -219,9 +226,8 @@ def _hold(
 
     The slide knows exactly whether it lasts; after a true graze it ends at once.
     """
-    n = state.size
-    here = leaving_rate(system, surfaces, surface, signs[surface], signs, state, parameters, rate[:n])
-    there = leaving_rate(system, surfaces, surface, -signs[surface], signs, state, parameters, rate[:n])
+    here = leaving_rate(system, surfaces, surface, signs[surface], signs, state, parameters, rate)
+    there = leaving_rate(system, surfaces, surface, -signs[surface], signs, state, parameters, rate)
     if abs(here) <= BALANCE * abs(there):
         signs[surface] = 0
         contact[surface] = 0
@@ -232,7 +238,8 @@ def _switching_polynomials(surfaces: Surfaces, n: int, degree: int, polynomials:
     """Switching functions along a step into the rows after the states."""
     for i in range(surfaces.pivots.size):
         row = polynomials[n + i]
-        row[: degree + 1] = 0.0
+        for k in range(1, degree + 1):
+            row[k] = 0.0
         row[0] = surfaces.rows[i, n]
         for j in range(n):
             factor = surfaces.rows[i, j]
@@ -265,7 +272,7 @@ def _meet(
                 project(surfaces, i, state)
     for i in range(signs.size):
         if contact[i] == 1:
-            signs[i] = resolve(system, surfaces, i, signs, state, parameters, rate[: state.size])
+            signs[i] = resolve(system, surfaces, i, signs, state, parameters, rate)
 
 
 @specialised
@@ -292,4 +299,4 @@ def _release(
     for i in range(signs.size):
         if i != surface and switching_value(surfaces, i, state) == 0.0:
             contact[i] = 1
-            signs[i] = resolve(system, surfaces, i, signs, state, parameters, rate[: state.size])
+            signs[i] = resolve(system, surfaces, i, signs, state, parameters, rate)

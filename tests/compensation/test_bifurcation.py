@@ -1,0 +1,97 @@
+"""The diagram of figure 9 and its kin, against what is known of them."""
+
+import numpy as np
+import pytest
+
+from compensation.bifurcation import Branch, Diagram, diagram, where_it_ends
+from compensation.closed_loop import ClosedLoop
+from compensation.controller import Controller, Gains
+from ident.model.friction import ModelError
+from ident.model.published import asymmetric_robot, symmetric_robot
+from ident.model.robot import OneLinkRobot
+
+
+def loop(r: float = 1.0, observer: float = 73.5, robot: OneLinkRobot | None = None) -> ClosedLoop:
+    gains = Gains(proportional=0.4, derivative=0.02, observer=observer, compensation=r)
+    return ClosedLoop(robot or symmetric_robot(), Controller(gains, symmetric_robot()))
+
+
+def branches(drawn: Diagram, kind: str) -> list[Branch]:
+    return [branch for branch in drawn.branches if branch.kind == kind]
+
+
+def test_figure_9() -> None:
+    drawn = diagram(loop(), "r", np.linspace(0.8, 1.2, 41))
+    (rest,) = branches(drawn, "equilibrium_set")
+    (cycle,) = branches(drawn, "limit_cycle")
+    alone = branches(drawn, "equilibrium")
+    assert rest.points[-1].value < 1.0 < cycle.points[0].value
+    assert [branch.stable for branch in alone if branch.points[-1].value > 1.0] == [False]
+    amplitudes = [point.amplitude for point in cycle.points]
+    assert amplitudes == sorted(amplitudes)
+    near = min(cycle.points, key=lambda point: abs(point.value - 1.1))
+    assert near.amplitude == pytest.approx(0.35368017536, abs=1e-9)
+    assert near.period == pytest.approx(6.383337703, abs=1e-8)
+    onset = next(b for b in drawn.bifurcations if "limit cycle appears" in b.kind)
+    assert onset.value == pytest.approx(1.0, abs=1e-5)
+    assert "zero amplitude" in onset.kind
+    assert next(b for b in drawn.bifurcations if "equilibria" in b.kind).value == pytest.approx(1.0, abs=1e-9)
+
+
+def test_below_the_critical_gain_the_cycle_jumps_and_equilibria_coexist() -> None:
+    drawn = diagram(loop(observer=40.0), "r", np.linspace(0.99, 1.06, 29))
+    onset = next(b for b in drawn.bifurcations if "limit cycle appears" in b.kind)
+    assert "jump" in onset.kind
+    outer = [branch for branch in branches(drawn, "equilibrium_set") if branch.points[0].value > 1.0]
+    assert len(outer) == 2
+    assert max(p.amplitude for branch in outer for p in branch.points if p.value == 1.01) == pytest.approx(
+        0.249410046, abs=1e-8
+    )
+
+
+def test_asymmetric_robot_cycles_before_r_1_beside_its_equilibria() -> None:
+    drawn = diagram(loop(robot=asymmetric_robot()), "r", np.linspace(0.98, 1.1, 13))
+    (cycle,) = branches(drawn, "limit_cycle")
+    assert 0.99 < cycle.points[0].value <= 1.0
+    rests = branches(drawn, "equilibrium_set")
+    assert any(point.value > 1.0 for branch in rests for point in branch.points)
+    assert all(abs(point.x1_min + point.x1_max) > 1e-4 for point in cycle.points)
+    assert all(point.amplitude == max(-point.x1_min, point.x1_max) for point in cycle.points)
+    assert next(b for b in drawn.bifurcations if "equilibria" in b.kind).value == pytest.approx(
+        1.0564, abs=1e-4
+    )
+
+
+def test_over_the_observer_gain() -> None:
+    drawn = diagram(loop(r=1.05), "L", np.linspace(40.0, 120.0, 9))
+    (cycle,) = branches(drawn, "limit_cycle")
+    assert len(cycle.points) == 9
+    assert drawn.parameter == "L"
+    assert all(abs(m) < 1.0 for point in cycle.points for m in point.multipliers)
+
+
+def test_at_r_1_the_equilibrium_set_vanishes_at_the_critical_gain() -> None:
+    drawn = diagram(loop(r=1.0), "L", np.linspace(60.0, 80.0, 21))
+    change = next(b for b in drawn.bifurcations if "equilibria" in b.kind)
+    assert change.value == pytest.approx(73.0704, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("r", "start", "verdict"),
+    [
+        (0.99, 0.6, "equilibrium"),
+        (1.0, 0.6, "limit_cycle"),
+        (1.02, -0.1, "equilibrium"),
+        (1.02, 0.1, "limit_cycle"),
+    ],
+)
+def test_where_a_start_ends(r: float, start: float, verdict: str) -> None:
+    found = where_it_ends(loop(r, robot=asymmetric_robot()), (start, 0.0, 0.0), duration=30.0)
+    assert found.verdict == verdict
+
+
+def test_bad_input_is_named() -> None:
+    with pytest.raises(ModelError, match="'r' or 'L'"):
+        diagram(loop(), "n1", [1.0])  # type: ignore[arg-type]  # wrong on purpose
+    with pytest.raises(ModelError, match="ascending"):
+        diagram(loop(), "r", [1.0, 0.9])

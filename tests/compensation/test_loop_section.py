@@ -1,0 +1,118 @@
+"""Limit cycles of the closed loop and their multipliers: published numbers and finite differences."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compensation.closed_loop import ClosedLoop, simulate
+from compensation.controller import Controller, Gains
+from compensation.loop_section import LoopSection, with_gain
+from compensation.orbits.periodic_orbits import Cycle, NoCycle, find_cycle
+from ident.model.friction import StribeckFriction
+from ident.model.published import asymmetric_robot, symmetric_robot
+from ident.model.robot import OneLinkRobot
+from ident.simulation.filippov_system import FloatArray
+
+
+def section(r: float, observer: float = 73.5, robot: OneLinkRobot | None = None) -> LoopSection:
+    gains = Gains(proportional=0.4, derivative=0.02, observer=observer, compensation=r)
+    return LoopSection(ClosedLoop(robot or symmetric_robot(), Controller(gains, symmetric_robot())))
+
+
+def cycle_of(where: LoopSection, x1: float = 0.6) -> Cycle:
+    cycle = find_cycle(where, np.array([x1, 0.0]))
+    assert isinstance(cycle, Cycle)
+    return cycle
+
+
+def differences(where: LoopSection, point: FloatArray, step: float) -> FloatArray:
+    columns = []
+    for axis in np.eye(2):
+        ahead = where.follow(point + step * axis, 1).points[0]
+        behind = where.follow(point - step * axis, 1).points[0]
+        columns.append((ahead - behind) / (2 * step))
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize(
+    ("r", "amplitude", "period"), [(1.01, 0.09852434192, 7.551833164), (1.1, 0.35368017536, 6.383337703)]
+)
+def test_published_cycles(r: float, amplitude: float, period: float) -> None:
+    cycle = cycle_of(section(r))
+    assert cycle.amplitude == pytest.approx(amplitude, abs=1e-10)
+    assert cycle.period == pytest.approx(period, abs=1e-8)
+    assert cycle.stable
+    assert abs(cycle.multipliers[0]) < 1e-10
+
+
+@pytest.mark.parametrize(
+    ("r", "observer", "multiplier"),
+    [(1.0001, 73.5, 3.65e-4), (1.000015, 73.5, 4.3e-3), (1.001, 120.0, 0.0923)],
+)
+def test_half_map_multipliers_where_they_are_not_zero(r: float, observer: float, multiplier: float) -> None:
+    where = section(r, observer)
+    cycle = cycle_of(where)
+    slope = where.derivative(cycle.point)
+    assert slope is not None
+    largest = max(abs(np.linalg.eigvals(slope)))
+    assert largest == pytest.approx(multiplier, rel=0.01)
+    assert abs(cycle.multipliers[0]) == pytest.approx(largest**2, rel=1e-9)
+    by_differences = differences(where, cycle.point, 1e-6 * cycle.amplitude)
+    np.testing.assert_allclose(slope, by_differences, rtol=1e-4, atol=2e-9)
+
+
+def test_derivative_of_a_turn_with_sticking_and_asymmetry() -> None:
+    where = section(1.02, 60.0, asymmetric_robot())
+    point = np.array([0.25, -0.01])
+    slope = where.derivative(point)
+    assert slope is not None
+    np.testing.assert_allclose(slope, differences(where, point, 1e-7), rtol=1e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize("shape", [0.8, 1.5])
+def test_other_shapes_have_cycles_too(shape: float) -> None:
+    curve = replace(symmetric_robot().friction.positive, stribeck_shape=shape)
+    robot = replace(symmetric_robot(), friction=StribeckFriction.symmetric(curve))
+    gains = Gains(proportional=0.4, derivative=0.02, observer=100.0, compensation=1.1)
+    loop = ClosedLoop(robot, Controller(gains, robot))
+    cycle = cycle_of(LoopSection(loop))
+    state = (float(cycle.point[0]), float(cycle.point[1]), -float(cycle.point[1]))
+    run = simulate(loop, state, duration=cycle.period, times=[cycle.period], tolerance=1e-11)
+    np.testing.assert_allclose(run.state[0], state, atol=1e-6)
+
+
+def test_published_asymmetric_cycles_and_bistability() -> None:
+    robot = asymmetric_robot()
+    assert cycle_of(section(1.0, robot=robot)).amplitude == pytest.approx(0.185, abs=1e-3)
+    assert cycle_of(section(1.1, robot=robot)).amplitude == pytest.approx(0.391, abs=1e-3)
+    for start in (0.6, -0.6, 0.1):
+        assert isinstance(find_cycle(section(0.99, robot=robot), np.array([start, 0.0])), NoCycle)
+        assert isinstance(find_cycle(section(1.0, robot=robot), np.array([start, 0.0])), Cycle)
+    assert isinstance(find_cycle(section(1.02, robot=robot), np.array([-0.1, 0.0])), NoCycle)
+
+
+def test_the_asymmetric_map_finds_the_symmetric_cycle() -> None:
+    where = section(1.05)
+    slightly = symmetric_robot().friction.positive
+    other = replace(slightly, viscous_damping=slightly.viscous_damping * (1 + 1e-9))
+    robot = replace(symmetric_robot(), friction=StribeckFriction(slightly, other))
+    full = cycle_of(section(1.05, robot=robot))
+    half = cycle_of(where)
+    assert full.period == pytest.approx(half.period, rel=1e-7)
+    assert full.x1_min == pytest.approx(half.x1_min, rel=1e-7)
+
+
+def test_bursts_of_figure_6_are_the_limit_of_the_cycle() -> None:
+    cycle = cycle_of(section(1.01, 40.0))
+    for excess in (3e-3, 1e-3, 3e-4, 1e-4, 3e-5):
+        found = find_cycle(section(1.0 + excess, 40.0), cycle.point)
+        assert isinstance(found, Cycle)
+        cycle = found
+    assert cycle.amplitude == pytest.approx(0.2456, abs=2e-4)
+
+
+def test_with_gain_changes_one_gain() -> None:
+    loop = section(1.0).loop
+    assert with_gain(loop, "L", 50.0).controller.gains == replace(loop.controller.gains, observer=50.0)
+    assert with_gain(loop, "r", 0.9).controller.gains == replace(loop.controller.gains, compensation=0.9)
