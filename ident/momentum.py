@@ -5,8 +5,8 @@ Eq (1) integrated over a window [t1, t2] of motion in one direction, magnitudes 
     J (v2 - v1) = int u dt - b (q2 - q1) - F_c (t2 - t1) - dF int exp(-(v/v_s)^beta) dt.
 
 Nothing is differentiated twice, and the law enters as it stands. The torque is held between samples, so its
-integral is a sum. The speeds at the window's ends come from `data.differentiation` (a kinematic model,
-filtered and smoothed); the exponential needs the speed only roughly.
+integral is a sum. Speeds come from `data.differentiation` (a kinematic model, filtered and smoothed) with
+their standard errors, on at most a few hundred samples of the motion.
 
 Windows of a ramp share the speeds at their common ends: their errors are correlated, and the covariance
 below says so. What the model of noise leaves out (ripple, a friction that differs from place to place) is
@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from data.differentiation import differentiate
 from data.recording import FloatArray, Recording
 from ident.breakaway import Breakaway
 from ident.segmentation import grain
@@ -27,6 +28,8 @@ from ident.segmentation import grain
 WINDOWS = 8  # a ramp
 LEAST_COUNTS = 12.0  # of travel in the window that a speed is read from
 LEAST_SAMPLES = 5  # in it
+SMOOTHED = 400  # samples of a motion that are smoothed, at most
+RUN_IN = 4  # part of the motion by which the smoothing begins before it: one in so many
 NODES = 40  # of the integral of the exponential in a window
 JUMP = 0.2  # part of the torque by which one sample may differ from the last
 
@@ -48,7 +51,8 @@ class Momentum:
     def residual(self, inertia: float, law: tuple[float, float, float, float, float]) -> FloatArray:
         """Momentum that the law leaves unexplained (k,) [N m s]; law: F_c, dF, v_s, b, beta."""
         coulomb, stribeck, velocity, damping, shape = law
-        fading = np.exp(-((self.nodes / velocity) ** shape)).mean(axis=1) * self.duration
+        fading = np.exp(-((self.nodes / velocity) ** shape))
+        fading = np.trapezoid(fading, axis=1) / (NODES - 1) * self.duration
         friction = coulomb * self.duration + stribeck * fading + damping * self.travel
         return np.asarray(self.impulse - friction - inertia * self.gain)
 
@@ -66,25 +70,25 @@ def momentum(recording: Recording, start: Breakaway) -> Momentum | None:
     edges = _edges(time.size, half)
     if edges is None:
         return None
-    fits = [_local_motion(time, position, edge, half, grain(recording)) for edge in edges]
-    place = np.array([fit[0] for fit in fits])
-    speed = np.array([fit[1] for fit in fits])
-    variance = np.array([fit[2] for fit in fits])
+    speeds, errors = _smoothed_speeds(recording, first, past)
+    speeds *= start.direction
+    speed, variance = speeds[edges], errors[edges] ** 2
     if np.any(speed <= 0):
         return None
     step = np.diff(time, append=2 * time[-1] - time[-2])
     pushed = np.concatenate([[0.0], np.cumsum(torque * step)])
     scatter = float(np.mean(np.diff(torque) ** 2)) / 2.0
     windows = np.diff(np.eye(edges.size), axis=0)
+    samples = np.arange(time.size)
     nodes = np.array([np.linspace(a, b, NODES) for a, b in itertools.pairwise(edges)])
     return Momentum(
         log=recording.log,
         direction=start.direction,
         impulse=np.diff(pushed[edges]),
         duration=np.diff(time[edges]),
-        travel=np.diff(place),
+        travel=np.diff(position[edges]),
         gain=np.diff(speed),
-        nodes=_chord_speeds(time, position, nodes, half),
+        nodes=np.maximum(np.interp(nodes, samples, speeds), 0.0),
         speed_covariance=windows @ np.diag(variance) @ windows.T,
         impulse_variance=np.diff(time[edges]) * recording.sample_period * scatter,
     )
@@ -117,30 +121,13 @@ def _edges(samples: int, half: int) -> FloatArray | None:
     return np.linspace(half, samples - 1 - half, windows + 1).astype(np.int64)
 
 
-def _chord_speeds(time: FloatArray, position: FloatArray, nodes: FloatArray, half: int) -> FloatArray:
-    """Speeds (k, m) at nodes (k, m), in samples, from chords across 2 half samples [rad/s]."""
-    samples = np.arange(time.size, dtype=np.float64)
-    start, end = np.maximum(nodes - half, 0.0), np.minimum(nodes + half, samples[-1])
-    run = np.interp(end, samples, position) - np.interp(start, samples, position)
-    duration = np.interp(end, samples, time) - np.interp(start, samples, time)
-    return np.asarray(np.maximum(run / duration, 0.0))
+def _smoothed_speeds(recording: Recording, first: int, past: int) -> tuple[FloatArray, FloatArray]:
+    """Speed and its standard error at samples first to past (n,) [rad/s], from every few of a long motion.
 
-
-def _local_motion(
-    time: FloatArray, position: FloatArray, middle: int, half: int, resolution: float
-) -> tuple[float, float, float]:
-    """Position, speed and the speed's variance from a cubic through 2 half + 1 samples."""
-    part = slice(middle - half, middle + half + 1)
-    centred = time[part] - time[middle]
-    width = max(float(centred[-1]), float(np.finfo(np.float64).tiny))
-    basis = np.vander(centred / width, 4, increasing=True)
-    origin = position[middle]
-    coefficient, *_ = np.linalg.lstsq(basis, position[part] - origin, rcond=None)
-    residual = position[part] - origin - basis @ coefficient
-    scatter = max(resolution**2 / 12.0, float(residual @ residual) / max(centred.size - 4, 1))
-    inverse = np.linalg.inv(basis.T @ basis)
-    return (
-        float(origin + coefficient[0]),
-        float(coefficient[1] / width),
-        float(scatter * inverse[1, 1] / width**2),
-    )
+    The rest before it goes in as well: it tells the smoother where the motion came from.
+    """
+    before = max(first - (past - first) // RUN_IN, 0)
+    kept = np.arange(before, past, -(-(past - before) // SMOOTHED))
+    motion = differentiate(recording.time[kept], recording.position[kept], resolution=recording.resolution)
+    samples = np.arange(first, past)
+    return np.interp(samples, kept, motion.velocity), np.interp(samples, kept, motion.velocity_stderr)
