@@ -1,0 +1,1 @@
+"""Speed and accuracy beside peers, as commands: `python -m benchmarks.NAME`."""

@@ -18,14 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data.alignment import align
-from data.csv_describe import TIME_NAMES
-from data.csv_dialect import bare, sniff
-from data.csv_log import find_column, read_csv
-from data.field_path import FieldPath, parse_path
+from data.csv.description import TIME_NAMES
+from data.csv.dialect import bare, sniff
+from data.csv.log import find_column, read_csv
 from data.findings import Finding, LogError, Severity
 from data.integrity import Integrity
-from data.mcap_columns import McapColumns, Topic, read_columns
-from data.mcap_records import ByteArray
+from data.mcap.columns import McapColumns, Topic, read_columns
+from data.mcap.field_path import FieldPath, parse_path
+from data.mcap.records import ByteArray
 from data.names import shown
 from data.protocols import ProtocolName
 from data.recording import Axis, Recording

@@ -17,14 +17,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pipelines import command_options as option
-from pipelines import printed_answers as printed
 from pipelines.exit_status import Status
-from pipelines.refusals import ends_well
+from pipelines.terminal import answers as printed
+from pipelines.terminal import options as option
+from pipelines.terminal.refusals import ends_well
 
 if TYPE_CHECKING:
-    from pipelines.gains import GainOptions
-    from pipelines.results import Owner, ResultFolder
+    from pipelines.results.folder import Owner, ResultFolder
+    from pipelines.settings.gains import GainOptions
 
 app = typer.Typer(
     name="stribeck",
@@ -49,10 +49,10 @@ def demo(
 ) -> Status:
     """Record a whole campaign on a simulated rig, then `run` on it; Table 1 is printed beside the paper's."""
     from data.files import write_atomically
-    from pipelines.campaign import load_campaign
-    from pipelines.demo_campaign import demo_campaign_text
     from pipelines.progress import shown_progress, told
-    from pipelines.results import Owner, open_results
+    from pipelines.results.folder import Owner, open_results
+    from pipelines.settings.campaign import load_campaign
+    from pipelines.virtual.demo_campaign import demo_campaign_text
     from pipelines.virtual_rig import record as record_on
     from pipelines.whole_run import RunOptions, run_campaign
 
@@ -78,8 +78,8 @@ def record(
     as_json: option.Json = False,
 ) -> Status:
     """Let the virtual rig play the protocols of a campaign that has one, and write the logs it names."""
-    from pipelines.campaign import load_campaign
     from pipelines.progress import shown_progress, told
+    from pipelines.settings.campaign import load_campaign
     from pipelines.virtual_rig import record as record_on
 
     loaded = load_campaign(campaign, logs_exist=False)
@@ -102,7 +102,7 @@ def inspect(
     as_json: option.Json = False,
 ) -> Status:
     """What a log holds, with no settings at all: channels, units, rate, clock, gaps, integrity."""
-    from pipelines.inspect import inspect_logs
+    from pipelines.terminal.inspection import inspect_logs
 
     return inspect_logs(logs, as_json=as_json)
 
@@ -120,9 +120,9 @@ def identify(
     force: option.Force = False,
 ) -> Status:
     """Logs to the fitted robot: robot.json, the friction map, Table 1, figure 2."""
-    from pipelines.campaign import load_campaign
     from pipelines.progress import shown_progress
-    from pipelines.results import open_results
+    from pipelines.results.folder import open_results
+    from pipelines.settings.campaign import load_campaign
     from pipelines.whole_run import RunOptions, identify_campaign
 
     loaded = load_campaign(campaign)
@@ -153,10 +153,10 @@ def design(
     """Critical observer gains, equilibrium sets, certificates, recommended gains."""
     from pipelines.design import design as designed
     from pipelines.design import write_design
-    from pipelines.gains import chosen_gains, with_exact
-    from pipelines.results import open_results
-    from pipelines.robot_file import read_robot
+    from pipelines.results.folder import open_results
+    from pipelines.results.robot_file import read_robot
     from pipelines.robot_questions import conclude
+    from pipelines.settings.gains import chosen_gains, with_exact
 
     source = read_robot(robot)
     given = _gains(compensation_gain, observer_gain, proportional, derivative)
@@ -197,10 +197,10 @@ def simulate(
 ) -> Status:
     """One closed-loop run, exact between events: trajectory.csv with columns t, x1, x2, x3, v, u."""
     from compensation.controller import Controller
-    from pipelines.gains import chosen_gains, chosen_sampling
-    from pipelines.results import open_results
-    from pipelines.robot_file import read_robot
+    from pipelines.results.folder import open_results
+    from pipelines.results.robot_file import read_robot
     from pipelines.robot_questions import conclude, counted_resolution
+    from pipelines.settings.gains import chosen_gains, chosen_sampling
     from pipelines.simulate import parse_format, parse_start, simulate_loop, write_trajectory
 
     start, written_as = parse_start(x0), parse_format(form)
@@ -248,12 +248,12 @@ def predict(
     force: option.Force = False,
 ) -> Status:
     """The bifurcation diagram over the compensation gain r or the observer gain L."""
-    from pipelines.gains import chosen_sampling
     from pipelines.predict import one_sweep
     from pipelines.progress import shown_progress
-    from pipelines.results import open_results
-    from pipelines.robot_file import read_robot
+    from pipelines.results.folder import open_results
+    from pipelines.results.robot_file import read_robot
     from pipelines.robot_questions import conclude, counted_resolution, predict_robot
+    from pipelines.settings.gains import chosen_sampling
 
     sweep = one_sweep(over or [])
     source = read_robot(robot)
@@ -289,10 +289,10 @@ def compare(
     force: option.Force = False,
 ) -> Status:
     """Recorded set-point runs classified and laid over the prediction: figure 10."""
-    from pipelines.campaign import load_campaign
     from pipelines.progress import shown_progress
-    from pipelines.results import open_results
-    from pipelines.robot_file import read_robot
+    from pipelines.results.folder import open_results
+    from pipelines.results.robot_file import read_robot
+    from pipelines.settings.campaign import load_campaign
     from pipelines.whole_run import RunOptions, compare_campaign
 
     loaded, source = load_campaign(campaign), read_robot(robot)
@@ -332,9 +332,9 @@ def run(
     force: option.Force = False,
 ) -> Status:
     """All of it: identify, design, predict, compare, and report.html."""
-    from pipelines.campaign import load_campaign
     from pipelines.progress import shown_progress
-    from pipelines.results import open_results
+    from pipelines.results.folder import open_results
+    from pipelines.settings.campaign import load_campaign
     from pipelines.whole_run import RunOptions, run_campaign
 
     loaded = load_campaign(campaign)
@@ -364,8 +364,8 @@ def paper(
 ) -> Status:
     """Table 1 and figures 2, 4, 6, 7, 8 and 9 of the paper, from its published parameters alone."""
     from pipelines.paper import write_paper
-    from pipelines.results import open_results
-    from pipelines.robot_file import paper_robot
+    from pipelines.results.folder import open_results
+    from pipelines.results.robot_file import paper_robot
     from pipelines.robot_questions import conclude
 
     source = paper_robot()
@@ -396,7 +396,7 @@ def _gains(
     derivative: float | None,
     sample_period: float | None = None,
 ) -> GainOptions:
-    from pipelines.gains import GainOptions
+    from pipelines.settings.gains import GainOptions
 
     return GainOptions(compensation, observer, proportional, derivative, sample_period)
 

@@ -25,14 +25,13 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from compensation.bifurcation import Diagram, diagram
 
+from compensation.bifurcation import Diagram, diagram
 from compensation.closed_loop import ClosedLoop
 from compensation.equilibria import equilibrium_set
 from data.recording import Axis, FloatArray
 from ident.estimate import RunUse
 from ident.model.robot import OneLinkRobot
-from pipelines.loop_settings import LawChoice
 from pipelines.onset import (
     Bracket,
     Found,
@@ -47,8 +46,8 @@ from pipelines.onset import (
 )
 from pipelines.progress import Progress, Silent, Tick
 from pipelines.recordings import SetPointRun
-from pipelines.results import ResultFolder
-from pipelines.robot_file import RobotFile
+from pipelines.results.folder import ResultFolder
+from pipelines.results.robot_file import RobotFile
 from pipelines.run_outcomes import (
     LoopAsRun,
     Outcome,
@@ -59,6 +58,7 @@ from pipelines.run_outcomes import (
     recorded_outcome,
     unpredicted,
 )
+from pipelines.settings.loop import LawChoice
 
 COMPARISON_SCHEMA: Final = "stribeck/comparison/1"
 DRAWS: Final = 40

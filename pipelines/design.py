@@ -46,9 +46,9 @@ from pipelines.design_quantities import (
     threshold_values,
 )
 from pipelines.equilibrium_sweeps import FIGURE_8_GAINS, edges, extrema, observer_gain_axis, with_folds
-from pipelines.loop_settings import LawChoice
-from pipelines.results import ResultFolder
-from pipelines.robot_file import RobotFile
+from pipelines.results.folder import ResultFolder
+from pipelines.results.robot_file import RobotFile
+from pipelines.settings.loop import LawChoice
 
 DESIGN_SCHEMA: Final = "stribeck/design/1"
 DRAWS: Final = 1000

@@ -24,7 +24,7 @@ from compensation.recommendation import ThresholdEnds, overcompensation_threshol
 from ident.estimate import CURVE_PARAMETERS, Estimate
 from ident.model.friction import StribeckCurve
 from ident.model.robot import OneLinkRobot
-from pipelines.robot_file import RobotFile
+from pipelines.results.robot_file import RobotFile
 
 CRITICAL_GAINS: Final = ("positive", "negative", "mean", "worst")
 RATES: Final = ("observer_error", "loop")

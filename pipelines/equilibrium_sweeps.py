@@ -12,7 +12,7 @@ from compensation.controller import Controller, Gains
 from compensation.equilibria import EquilibriumSet, equilibrium_set, equilibrium_sets
 from data.recording import FloatArray
 from ident.model.robot import OneLinkRobot
-from pipelines.results import ResultFolder
+from pipelines.results.folder import ResultFolder
 
 FIGURE_8_GAINS: Final = (0.9, 0.95, 0.99, 1.0, 1.005, 1.01, 1.02)  # r; the paper does not print its own
 _POINTS: Final = 481

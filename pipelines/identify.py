@@ -1,8 +1,8 @@
 """identify: logs into the fitted robot, with everything that shows how it came about.
 
-Writes `robot.json` (`pipelines.robot_file`), `friction_map.csv` (a row a point or a run left out, columns as
-the fields of `ident.friction_map.MapPoint`), `fit_report.txt`, Table 1 as `.csv`, `.md` and `.tex`, and
-`figure2.svg`.
+Writes `robot.json` (`pipelines.results.robot_file`), `friction_map.csv` (a row a point or a run left out,
+columns as the fields of `ident.friction_map.MapPoint`), `fit_report.txt`, Table 1 as `.csv`, `.md` and
+`.tex`, and `figure2.svg`.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from ident.estimate import IdentifiedRobot
 from ident.friction_map import MapPoint
 from ident.identification import Identification
 from ident.identification import identify as fit
-from pipelines.loop_settings import LoopDefaults
 from pipelines.recordings import ReadLogs
-from pipelines.results import ResultFolder
-from pipelines.robot_file import write_robot
+from pipelines.results.folder import ResultFolder
+from pipelines.results.robot_file import write_robot
+from pipelines.settings.loop import LoopDefaults
 
 
 def identify(logs: ReadLogs, *, free_beta: bool = False) -> Identification:

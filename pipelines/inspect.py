@@ -1,31 +1,28 @@
 """What a log holds, with no settings at all: channels, units, rate, clock, gaps, integrity, what is lost.
 
-The answer is a value: `to_plain` gives it to a program (schema `stribeck/inspection/1`), `inspection_text`
+The answer is a value: `to_plain` gives it to a program (schema `stribeck/inspection/1`); the terminal
 draws it for a person. Its status says whether the log is whole, readable in part, or not at all.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import sys
 import time
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from data import csv_describe, mcap_describe
-from data.csv_describe import CsvDescription
+from data.csv import description as csv_description
+from data.csv.description import CsvDescription
 from data.findings import LogError
 from data.ingest import read_bytes
 from data.integrity import Integrity
-from data.mcap_describe import McapDescription
+from data.mcap import description as mcap_description
+from data.mcap.description import McapDescription
 from data.signals import Format, log_format
 from pipelines.exit_status import Status
 
 SCHEMA: Final = "stribeck/inspection/1"
-MANY: Final = "stribeck/inspections/1"
 
 
 @dataclass(frozen=True)
@@ -70,10 +67,10 @@ def inspect_log(path: Path) -> Inspection:
     content = read_bytes(path, log=log)
     found: McapDescription | CsvDescription
     if file_format == "mcap":
-        found = mcap_describe.describe(content)
+        found = mcap_description.describe(content)
     else:
         try:
-            found = csv_describe.describe(content.tobytes())
+            found = csv_description.describe(content.tobytes())
         except LogError as error:
             raise LogError(f"{log}: {error}") from error
     inspection = Inspection(log, file_format, content.size, time.perf_counter() - begin, found)
@@ -97,18 +94,25 @@ def to_plain(inspection: Inspection) -> dict[str, Any]:
         "integrity": _integrity(inspection.integrity),
         "metadata": dict(content.metadata),
     }
-    if isinstance(content, McapDescription):
-        return shared | {
-            "profile": content.profile,
-            "library": content.library,
-            "chunks": dict(content.compressions),
-            "indexed": content.indexed,
-            "channels": [_with_rates(asdict(channel)) for channel in content.channels],
-            "empty_topics": list(content.empty_topics),
-            "attachments": [asdict(label) for label in content.attachments],
-        }
+    own = _mcap(content) if isinstance(content, McapDescription) else _csv(content)
+    return {key: _finite(value) for key, value in (shared | own).items()}
+
+
+def _mcap(content: McapDescription) -> dict[str, Any]:
+    return {
+        "profile": content.profile,
+        "library": content.library,
+        "chunks": dict(content.compressions),
+        "indexed": content.indexed,
+        "channels": [_with_rates(asdict(channel)) for channel in content.channels],
+        "empty_topics": list(content.empty_topics),
+        "attachments": [asdict(label) for label in content.attachments],
+    }
+
+
+def _csv(content: CsvDescription) -> dict[str, Any]:
     layout = content.layout
-    return shared | {
+    return {
         "dialect": {
             "delimiter": layout.delimiter,
             "decimal": layout.decimal,
@@ -159,30 +163,3 @@ def _finite(value: Any) -> Any:
     if isinstance(value, list | tuple):
         return [_finite(inside) for inside in value]
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def inspect_logs(logs: Sequence[Path], *, as_json: bool = False) -> Status:
-    """Inspect logs and print each; the gravest status of all."""
-    from pipelines.inspection_text import print_inspection  # noqa: PLC0415  # rich is only needed to print
-
-    worst, answers = Status.DONE, []
-    for path in logs:
-        try:
-            inspection = inspect_log(path)
-        except LogError as error:
-            worst = Status.REFUSED
-            answers.append(
-                {"schema": SCHEMA, "log": path.as_posix(), "status": "unreadable", "error": str(error)}
-            )
-            print(f"stribeck: {error}", file=sys.stderr)
-            continue
-        if worst is Status.DONE:
-            worst = inspection.status
-        if as_json:
-            answers.append(to_plain(inspection))
-        else:
-            print_inspection(inspection)
-    if as_json:
-        whole = answers[0] if len(answers) == 1 else {"schema": MANY, "logs": answers}
-        print(json.dumps(_finite(whole), indent=1, allow_nan=False))
-    return worst

@@ -22,7 +22,7 @@ from ident.model.robot import OneLinkRobot
 from ident.simulation.trajectory import Trajectory
 from pipelines.report.style import svg_text
 from pipelines.report.time_figures import figure6, figure7
-from pipelines.results import ResultFolder
+from pipelines.results.folder import ResultFolder
 
 BELOW: Final = 0.55  # of the critical gain
 ABOVE: Final = 1.006  # of the critical gain

@@ -41,7 +41,6 @@ from ident.model.published import (
     symmetric_robot,
 )
 from ident.simulation.trajectory import Trajectory
-from pipelines.diagram_file import write_diagram
 from pipelines.equilibrium_sweeps import (
     FIGURE_8_GAINS,
     edges,
@@ -56,7 +55,8 @@ from pipelines.report.equilibrium_figures import figure4, figure8
 from pipelines.report.friction_figures import figure2
 from pipelines.report.style import svg_text
 from pipelines.report.time_figures import figure6, figure7
-from pipelines.results import ResultFolder
+from pipelines.results.diagram_file import write_diagram
+from pipelines.results.folder import ResultFolder
 
 START: Final = (1.0, 0.0, 0.0)  # of figures 6 and 7: x1 [rad], x2, x3 [rad/s]
 PERTURBATION: Final = 1e-5  # r - 1 of figure 6's second curve

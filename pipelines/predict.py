@@ -23,10 +23,10 @@ from compensation.sampled_bifurcation import sampled_cycles
 from compensation.sampled_loop import Map, Sampling
 from data.recording import FloatArray
 from ident.model.robot import OneLinkRobot
-from pipelines.diagram_file import write_diagram
 from pipelines.exit_status import UsageError
 from pipelines.progress import Progress, Silent
-from pipelines.results import ResultFolder
+from pipelines.results.diagram_file import write_diagram
+from pipelines.results.folder import ResultFolder
 
 MOST_POINTS: Final = 100_000
 _SWEEP_PARTS: Final = 3

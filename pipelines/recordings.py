@@ -15,11 +15,11 @@ from data.ingest import read_recording
 from data.protocols import ProtocolName, SetPoint
 from data.recording import Recording
 from ident.estimate import RunUse
-from pipelines.campaign import Campaign, Experiment
 from pipelines.executors.processes import Spread
 from pipelines.executors.serial import serial_map
-from pipelines.loop_settings import Compensator
 from pipelines.progress import Progress, Silent, counted
+from pipelines.settings.campaign import Campaign, Experiment
+from pipelines.settings.loop import Compensator
 
 
 @dataclass(frozen=True)

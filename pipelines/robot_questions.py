@@ -12,13 +12,13 @@ from compensation.sampled_loop import Sampling
 from data.recording import Axis
 from pipelines.executors.threads import opened_threads
 from pipelines.exit_status import Status, UsageError
-from pipelines.gains import GainOptions, chosen_gains
-from pipelines.loop_settings import LawChoice, resolution_of
-from pipelines.manifest import Command, write_manifest
 from pipelines.predict import Sweep, predict, write_prediction
 from pipelines.progress import Progress
-from pipelines.results import ResultFolder
-from pipelines.robot_file import RobotFile
+from pipelines.results.folder import ResultFolder
+from pipelines.results.manifest import Command, write_manifest
+from pipelines.results.robot_file import RobotFile
+from pipelines.settings.gains import GainOptions, chosen_gains
+from pipelines.settings.loop import LawChoice, resolution_of
 
 
 def axis_of(source: RobotFile) -> Axis:

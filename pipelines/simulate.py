@@ -21,12 +21,12 @@ import numpy as np
 from compensation.closed_loop import ClosedLoop, simulate, torque
 from compensation.controller import Controller
 from compensation.sampled_loop import Sampling, run_sampled
-from data.mcap_log import write_mcap
+from data.mcap.writer import write_mcap
 from data.recording import FloatArray
 from ident.model.robot import OneLinkRobot
 from ident.response import respond
 from pipelines.exit_status import RefusalError, UsageError
-from pipelines.results import ResultFolder
+from pipelines.results.folder import ResultFolder
 
 Format = Literal["csv", "mcap"]
 HEADER: Final = ("t", "x1", "x2", "x3", "v", "u")

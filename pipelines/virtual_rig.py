@@ -23,14 +23,14 @@ from data.instruments import Encoder, TorqueChannel
 from data.recording import FloatArray
 from data.units import Quantity
 from ident.response import TorqueRipple, plant_array
-from pipelines.campaign import Campaign, Experiment
-from pipelines.campaign_error import CampaignError
-from pipelines.loop_settings import resolution_of
-from pipelines.virtual_bench import Bench
-from pipelines.virtual_log import Look, write_log
-from pipelines.virtual_protocols import Run, breakaways, constant_speeds, excitations, multisines, rounded
-from pipelines.virtual_rig_settings import VirtualRig
-from pipelines.virtual_set_points import set_points
+from pipelines.settings.campaign import Campaign, Experiment
+from pipelines.settings.campaign_error import CampaignError
+from pipelines.settings.loop import resolution_of
+from pipelines.settings.virtual_rig import VirtualRig
+from pipelines.virtual.bench import Bench
+from pipelines.virtual.log import Look, write_log
+from pipelines.virtual.protocols import Run, breakaways, constant_speeds, excitations, multisines, rounded
+from pipelines.virtual.set_points import set_points
 
 TRUTH = "truth.json"
 COUNTS = 2.0**18  # of the encoder where neither [virtual_rig] nor [rig] has any

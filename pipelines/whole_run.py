@@ -19,25 +19,25 @@ from compensation.controller import Gains
 from data.findings import Severity
 from data.recording import Recording
 from ident.estimate import IdentifiedRobot
-from pipelines.campaign import Campaign
 from pipelines.compare import compare, write_comparison, write_figure10
 from pipelines.design import design, write_design
 from pipelines.executors.processes import opened_map
 from pipelines.executors.threads import opened_threads
 from pipelines.exit_status import Status, UsageError
-from pipelines.gains import GainOptions, chosen_gains, chosen_sampling, with_exact
 from pipelines.identify import identify, left_out, write_identification
-from pipelines.loop_settings import LawChoice
-from pipelines.manifest import Command, versions, write_manifest
 from pipelines.motion_figures import write_motion_figures
 from pipelines.predict import Sweep, one_sweep
 from pipelines.progress import Progress
 from pipelines.recordings import IDENTIFYING, ReadLogs, SetPointLogs, SetPointRun, read_logs, set_point_logs
 from pipelines.report.page import report_page
-from pipelines.results import ResultFolder
-from pipelines.robot_file import RobotFile, read_robot, withheld_parameters
+from pipelines.results.folder import ResultFolder
+from pipelines.results.manifest import Command, versions, write_manifest
+from pipelines.results.robot_file import RobotFile, read_robot, withheld_parameters
 from pipelines.robot_questions import axis_of, predict_robot
 from pipelines.run_outcomes import sampled_outcomes
+from pipelines.settings.campaign import Campaign
+from pipelines.settings.gains import GainOptions, chosen_gains, chosen_sampling, with_exact
+from pipelines.settings.loop import LawChoice
 
 PICTURES = ("figure2", "figure4", "figure6", "figure7", "figure8", "figure9", "figure10")
 SWEEP_POINTS = 101

@@ -1,4 +1,4 @@
-"""Spread over threads of this process: for compiled kernels, which let go of the interpreter while they run."""
+"""Spread over threads of this process: for compiled kernels, which let go of the interpreter."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from typing import Any, Final
 from data.names import shown
 from ident.model import published
 from pipelines.report.numerals import half_width, shown_interval, shown_number
-from pipelines.results import csv_text
+from pipelines.results.folder import csv_text
 
 DIRECTIONS: Final = {"positive": "q̇ > 0", "negative": "q̇ < 0", "mean": "mean"}
 SYMBOLS: Final = {  # in the order of the paper's Table 1

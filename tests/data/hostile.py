@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from data.mcap_container import MAGIC
-from data.mcap_log import Encoding, write_mcap
+from data.mcap.container import MAGIC
+from data.mcap.writer import Encoding, write_mcap
 
 
 def record(opcode: int, content: bytes, claimed: int | None = None) -> bytes:

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from data.csv_log import write_csv
+from data.csv.log import write_csv
 from data.findings import LogError
 from data.ingest import read_recording
-from data.mcap_log import write_mcap
+from data.mcap.writer import write_mcap
 from data.recording import FloatArray, Recording
 from data.signals import RigSignals, Signal, Signals
 from tests.data import hostile

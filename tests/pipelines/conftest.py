@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from pipelines.campaign import load_campaign
 from pipelines.cli import app
-from pipelines.demo_campaign import demo_campaign_text
+from pipelines.settings.campaign import load_campaign
+from pipelines.virtual.demo_campaign import demo_campaign_text
 from pipelines.virtual_rig import record
 
 SMALLER = {

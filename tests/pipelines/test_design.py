@@ -16,9 +16,9 @@ from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate, IdentifiedRob
 from ident.model.friction import StribeckCurve
 from ident.model.published import INERTIA, NEGATIVE, POSITIVE
 from pipelines.design import design, write_design
-from pipelines.loop_settings import LoopDefaults
-from pipelines.results import Owner, ResultFolder
-from pipelines.robot_file import RobotFile, paper_robot
+from pipelines.results.folder import Owner, ResultFolder
+from pipelines.results.robot_file import RobotFile, paper_robot
+from pipelines.settings.loop import LoopDefaults
 
 GAINS = Gains(0.4, 0.02, observer=73.5, compensation=1.0)
 

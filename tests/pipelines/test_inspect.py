@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from data.csv_log import write_csv
+from data.csv.log import write_csv
 from data.findings import LogError
-from data.mcap_log import write_mcap
+from data.mcap.writer import write_mcap
 from pipelines.exit_status import Status
-from pipelines.inspect import SCHEMA, inspect_log, inspect_logs, to_plain
-from pipelines.inspection_text import print_inspection
+from pipelines.inspect import SCHEMA, inspect_log, to_plain
+from pipelines.terminal.inspection import inspect_logs, print_inspection
 from tests.data import hostile
 
 
@@ -114,7 +114,7 @@ def test_channels_that_cannot_be_decoded_are_listed_with_the_reason(tmp_path: Pa
     path.write_bytes(hostile.file(head, hostile.message(1, 1, b"\x08\x01")))
     channel = to_plain(inspect_log(path))["channels"][0]
     assert "protobuf" in channel["refused"]
-    assert channel["fields"] == ()
+    assert channel["fields"] == []
     assert "protobuf" in drawn(path)
 
 

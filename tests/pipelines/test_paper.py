@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pipelines.paper import table1, write_paper
-from pipelines.results import Owner, ResultFolder
+from pipelines.results.folder import Owner, ResultFolder
 
 
 @pytest.fixture(scope="module")

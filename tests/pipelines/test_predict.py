@@ -16,7 +16,7 @@ from compensation.sampled_loop import Sampling
 from ident.model.published import asymmetric_robot, symmetric_robot
 from pipelines.exit_status import UsageError
 from pipelines.predict import Prediction, one_sweep, parse_sweep, predict, write_prediction
-from pipelines.results import Owner, ResultFolder
+from pipelines.results.folder import Owner, ResultFolder
 
 PAPER = Gains(0.4, 0.02, observer=73.5, compensation=1.0)
 

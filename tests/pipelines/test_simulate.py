@@ -13,7 +13,7 @@ from compensation.controller import Controller, Gains
 from compensation.sampled_loop import Sampling, run_sampled
 from ident.model.published import asymmetric_robot, symmetric_robot
 from pipelines.exit_status import UsageError
-from pipelines.results import Owner, ResultFolder
+from pipelines.results.folder import Owner, ResultFolder
 from pipelines.simulate import (
     HEADER,
     SimulatedRun,

@@ -9,14 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from data.csv_log import write_csv
+from data.csv.log import write_csv
 from data.ingest import read_recording
 from data.recording import Recording
 from ident.model.published import asymmetric_robot
 from ident.response import law_array
-from pipelines.campaign import Campaign, load_campaign
-from pipelines.campaign_error import CampaignError
-from pipelines.demo_campaign import demo_campaign_text
+from pipelines.settings.campaign import Campaign, load_campaign
+from pipelines.settings.campaign_error import CampaignError
+from pipelines.virtual.demo_campaign import demo_campaign_text
 from pipelines.virtual_rig import TRUTH, record
 
 COUNT = 2 * math.pi / 2**18

@@ -1,0 +1,1 @@
+"""CSV logs in the dialects that rigs write."""

@@ -1,0 +1,1 @@
+"""MCAP logs: the walk through untrusted bytes, columns out of them, and the writer."""

@@ -1,0 +1,155 @@
+"""What an MCAP file holds, with no settings: channels, their fields, clocks, and what is proved of the bytes.
+
+One walk. Every channel's log times are kept; the first message is decoded to list its fields. Header stamps
+are read for all messages where a layout can be proved, which costs next to nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+from mcap.records import Channel, Schema
+from numpy.typing import NDArray
+
+from data.clocks import ClockReport, clock_report_ns
+from data.findings import LogError
+from data.integrity import Integrity
+from data.mcap import joint_state
+from data.mcap.columns import run_metadata
+from data.mcap.decoding import decoder
+from data.mcap.field_path import leaves
+from data.mcap.records import ByteArray, gather
+from data.mcap.walk import AttachmentLabel, Block, McapWalk
+
+_MOST_FIELDS: Final = 200
+
+
+@dataclass(frozen=True)
+class Field:
+    """One field of a channel's messages, from the first one."""
+
+    path: str  # as a field path after the topic's colon
+    value: float | str | None  # [as logged] of the first message; None: an empty array
+    length: int | None = None  # of an array
+    joints: tuple[str, ...] = ()  # names beside an array of that length
+
+
+@dataclass(frozen=True)
+class ChannelDescription:
+    """One channel."""
+
+    topic: str
+    encoding: str
+    schema: str  # name, empty for none
+    schema_encoding: str
+    fields: tuple[Field, ...]
+    refused: str | None  # why its messages cannot be decoded
+    log_clock: ClockReport
+    header_clock: ClockReport | None
+
+
+@dataclass(frozen=True)
+class McapDescription:
+    """One file."""
+
+    profile: str
+    library: str
+    compressions: Mapping[str, int]  # chunks by compression
+    indexed: bool
+    channels: tuple[ChannelDescription, ...]
+    empty_topics: tuple[str, ...]  # declared, without a message
+    metadata: Mapping[str, str]
+    attachments: tuple[AttachmentLabel, ...]
+    integrity: Integrity
+
+
+@dataclass
+class _Seen:
+    """What the walk gathers of one channel."""
+
+    channel: Channel
+    schema: Schema | None
+    first: bytes
+    log: list[NDArray[np.int64]] = field(default_factory=list)
+    header: list[NDArray[np.int64]] = field(default_factory=list)
+    layout: joint_state.Layout | None = None
+
+
+def describe(content: ByteArray) -> McapDescription:
+    """Describe a file's bytes. Damage is no error here: see its `integrity`."""
+    walk = McapWalk(content)
+    seen: dict[int, _Seen] = {}
+    for block in walk.blocks():
+        for number in np.unique(block.messages.channel).tolist():
+            _take(walk, block, number, seen)
+    topics = {part.channel.topic for part in seen.values()}
+    return McapDescription(
+        profile=walk.header.profile,
+        library=walk.header.library,
+        compressions=walk.compressions,
+        indexed=walk.indexed,
+        channels=tuple(_channel(part) for part in seen.values()),
+        empty_topics=tuple(c.topic for c in walk.channels.values() if c.topic not in topics),
+        metadata=run_metadata(walk),
+        attachments=tuple(walk.attachments),
+        integrity=walk.integrity,
+    )
+
+
+def _take(walk: McapWalk, block: Block, number: int, seen: dict[int, _Seen]) -> None:
+    found = block.messages
+    mine = np.flatnonzero(found.channel == number)
+    begin, length = found.begin[mine], found.length[mine]
+    if number not in seen:
+        channel = walk.channels[number]
+        schema = walk.schemas.get(channel.schema_id)
+        first = block.data[int(begin[0]) : int(begin[0] + length[0])].tobytes()
+        seen[number] = _Seen(channel, schema, first)
+        if schema and joint_state.is_joint_state(schema.name, schema.data.decode(errors="replace")):
+            seen[number].layout = joint_state.recognise(first)
+    part = seen[number]
+    part.log.append(found.log_time[mine])
+    if part.layout is not None:
+        if np.all(length == part.layout.size):
+            rows = gather(block.data, begin, part.layout.size)
+            if joint_state.matches(part.layout, rows).all():
+                part.header.append(joint_state.stamps(rows))
+                return
+        part.layout, part.header = None, []
+
+
+def _channel(part: _Seen) -> ChannelDescription:
+    fields: tuple[Field, ...] = ()
+    refused = None
+    try:
+        fields = _fields(decoder(part.channel, part.schema)(part.first))
+    except LogError as error:
+        refused = str(error)
+    return ChannelDescription(
+        topic=part.channel.topic,
+        encoding=part.channel.message_encoding,
+        schema=part.schema.name if part.schema else "",
+        schema_encoding=part.schema.encoding if part.schema else "",
+        fields=fields,
+        refused=refused,
+        log_clock=clock_report_ns(np.concatenate(part.log)),
+        header_clock=clock_report_ns(np.concatenate(part.header)) if part.header else None,
+    )
+
+
+def _fields(message: object) -> tuple[Field, ...]:
+    listed = []
+    found = dict(leaves(message))
+    for path, value in list(found.items())[:_MOST_FIELDS]:
+        if isinstance(value, str | bytes) or not hasattr(value, "__len__"):
+            listed.append(Field(path, value if isinstance(value, int | float | str) else str(value)))
+            continue
+        elements = list(value) if hasattr(value, "__iter__") else []
+        names = found.get(path.rpartition(".")[0] + "." * ("." in path) + "name")
+        joints = tuple(str(name) for name in names) if isinstance(names, list) and path != "name" else ()
+        first = elements[0] if elements and isinstance(elements[0], int | float | str) else None
+        listed.append(Field(path, first, len(elements), joints if len(joints) == len(elements) else ()))
+    return tuple(listed)

@@ -1,0 +1,1 @@
+"""What the user asked for: the campaign and the gains, as frozen values."""

@@ -1,0 +1,187 @@
+"""Fast columns equal the ordinary decoder's, whatever the layouts; what is refused says why."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap_ros2._dynamic import generate_dynamic, serialize_dynamic
+
+from data.findings import LogError
+from data.mcap import joint_state
+from data.mcap.columns import read_columns
+from data.mcap.field_path import parse_path
+from data.mcap.writer import METADATA_NAME
+from tests.data import hostile
+
+ENCODE = serialize_dynamic(joint_state.SCHEMA_NAME, joint_state.SCHEMA)[joint_state.SCHEMA_NAME]
+DECODE = generate_dynamic(joint_state.SCHEMA_NAME, joint_state.SCHEMA)[joint_state.SCHEMA_NAME]
+NUMBER = st.floats(allow_nan=True, allow_infinity=True, width=64)
+
+
+def joint_message(frame: str, names: list[str], values: list[float], stamp: int = 5) -> bytes:
+    header = {"stamp": {"sec": stamp, "nanosec": 7}, "frame_id": frame}
+    raw: bytes = ENCODE(
+        {"header": header, "name": names, "position": values, "velocity": [], "effort": values[::-1]}
+    )
+    return raw
+
+
+def joint_file(messages: list[bytes]) -> np.ndarray:
+    parts = [
+        hostile.schema(1, joint_state.SCHEMA_NAME, "ros2msg", joint_state.SCHEMA.encode()),
+        hostile.channel(1, 1, "/js", "cdr"),
+        *(hostile.message(1, k + 1, raw) for k, raw in enumerate(messages)),
+    ]
+    return np.frombuffer(hostile.file(hostile.chunk(b"".join(parts))), np.uint8)
+
+
+@settings(max_examples=80, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["", "b", "base", "base_link"]),
+            st.permutations(["a", "bb", "ccc"]),
+            NUMBER,
+            NUMBER,
+            NUMBER,
+        ),
+        min_size=1,
+        max_size=30,
+    )
+)
+def test_fast_and_ordinary_agree_bit_for_bit(rows: list[tuple[str, list[str], float, float, float]]) -> None:
+    messages = [joint_message(frame, names, list(values)) for frame, names, *values in rows]
+    wanted = [parse_path(p) for p in ("/js:position{bb}", "/js:position[2]", "/js:effort[0]")]
+    got = read_columns(joint_file(messages), wanted).topics["/js"]
+    decoded = [DECODE(raw) for raw in messages]
+    expected = np.array(
+        [
+            [m.position[m.name.index("bb")] for m in decoded],
+            [m.position[2] for m in decoded],
+            [m.effort[0] for m in decoded],
+        ]
+    )
+    values = np.stack([got.values[p.text] for p in wanted])
+    assert np.array_equal(values.view(np.int64), expected.view(np.int64))
+    assert got.header_time is not None
+    assert np.all(got.header_time == 5_000_000_007)
+
+
+def test_padding_may_hold_anything_and_other_bytes_may_not() -> None:
+    message = bytearray(joint_message("b", ["a"], [1.5]))
+    shape = joint_state.recognise(bytes(message))
+    assert shape is not None
+    fixed = {k for begin, end in shape.fixed for k in range(begin, end)}
+    numbers = {k for name in ("position", "effort") for k in range(shape.place(name), shape.place(name) + 8)}
+    padding = set(range(12, len(message))) - fixed - numbers
+    assert padding
+    for place in range(12, len(message)):
+        mutant = bytearray(message)
+        mutant[place] ^= 0x55
+        rows = np.frombuffer(bytes(mutant), np.uint8)[None, :]
+        assert joint_state.matches(shape, rows)[0] == (place not in fixed)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.binary(max_size=200))
+def test_no_bytes_upset_the_layout_reader(raw: bytes) -> None:
+    shape = joint_state.recognise(raw)
+    assert shape is None or shape.size == len(raw)
+
+
+def test_nested_fields_of_any_message() -> None:
+    text = (
+        "pkg/Motor motor\nfloat32[2] pair\nuint16 raw\nbool on\nstring label\n"
+        + "=" * 80
+        + "\nMSG: pkg/Motor\nfloat64 current\n"
+    )
+    encode = serialize_dynamic("pkg/msg/State", text)["pkg/msg/State"]
+    raw = encode({"motor": {"current": 2.5}, "pair": [1.0, -2.0], "raw": 65535, "on": True, "label": "x"})
+    content = hostile.file(
+        hostile.schema(1, "pkg/msg/State", "ros2msg", text.encode()),
+        hostile.channel(1, 1, "/s", "cdr"),
+        *(hostile.message(1, k, raw) for k in range(3)),
+    )
+    wanted = [parse_path(p) for p in ("/s:motor.current", "/s:pair[1]", "/s:raw", "/s:on")]
+    read = read_columns(np.frombuffer(content, np.uint8), wanted)
+    assert [read.topics["/s"].values[p.text][2] for p in wanted] == [2.5, -2.0, 65535.0, 1.0]
+    assert read.topics["/s"].header_time is None
+    assert read.decoded_singly == 3
+    for path, why in (
+        ("/s:motor", "group of fields"),
+        ("/s:label", "text, not a number"),
+        ("/s:motors.current", "no field 'motors'.*motor"),
+        ("/s:pair", "array of 2 elements"),
+        ("/s:pair[2]", "no element 2"),
+        ("/s:pair{x}", "no joint"),
+        ("/t:pair[0]", "no topic '/t'.*/s"),
+    ):
+        with pytest.raises(LogError, match=why):
+            read_columns(np.frombuffer(content, np.uint8), [parse_path(path)])
+
+
+@pytest.mark.parametrize(("with_schema"), [True, False])
+def test_json_with_and_without_schema(with_schema: bool) -> None:
+    body = {"header": {"stamp": {"sec": 3, "nanosec": 4}}, "motor": {"name": ["a", "b"], "i": [1, 2.5]}}
+    content = hostile.file(
+        hostile.schema(1, "S", "jsonschema", b"{}") if with_schema else b"",
+        hostile.channel(1, int(with_schema), "/j", "json"),
+        hostile.message(1, 9, json.dumps(body).encode()),
+    )
+    topic = read_columns(np.frombuffer(content, np.uint8), [parse_path("/j:motor.i{b}")]).topics["/j"]
+    assert topic.values["/j:motor.i{b}"].tolist() == [2.5]
+    assert topic.header_time is not None
+    assert topic.header_time.tolist() == [3_000_000_004]
+
+
+def test_unread_encodings_and_broken_messages_are_refused_by_name(capfd: pytest.CaptureFixture[str]) -> None:
+    cases = [
+        (
+            hostile.schema(1, "S", "protobuf", b"") + hostile.channel(1, 1, "/a", "protobuf"),
+            b"",
+            "'protobuf'",
+        ),
+        (hostile.schema(1, "S", "ros1msg", b"") + hostile.channel(1, 1, "/a", "ros1"), b"", "'ros1'"),
+        (hostile.channel(1, 0, "/a", "cdr"), b"", "no schema"),
+        (
+            hostile.schema(1, "p/msg/S", "ros2msg", b"what") + hostile.channel(1, 1, "/a", "cdr"),
+            b"",
+            "schema cannot",
+        ),
+        (hostile.channel(1, 0, "/a", "json"), b"{", "cannot be decoded"),
+        (
+            hostile.schema(1, joint_state.SCHEMA_NAME, "ros2msg", joint_state.SCHEMA.encode())
+            + hostile.channel(1, 1, "/a", "cdr"),
+            b"\0\1\0\0" + struct.pack("<I", 2**31),
+            "cannot be decoded",
+        ),
+    ]
+    for head, body, why in cases:
+        content = np.frombuffer(hostile.file(head, hostile.message(1, 1, body)), np.uint8)
+        with pytest.raises(LogError, match=why):
+            read_columns(content, [parse_path("/a:position")])
+    assert capfd.readouterr() == ("", "")  # a foreign parser may not print what a log holds
+
+
+def test_two_publishers_at_once_are_refused_and_in_turn_are_joined() -> None:
+    heads = hostile.channel(1, 0, "/a", "json") + hostile.channel(2, 0, "/a", "json")
+    bodies = [json.dumps({"x": k}).encode() for k in range(4)]
+    turns = [hostile.message(1 + k // 2, k, body) for k, body in enumerate(bodies)]
+    mixed = [hostile.message(1 + k % 2, k, body) for k, body in enumerate(bodies)]
+    read = read_columns(np.frombuffer(hostile.file(heads, *turns), np.uint8), [parse_path("/a:x")])
+    assert read.topics["/a"].values["/a:x"].tolist() == [0, 1, 2, 3]
+    with pytest.raises(LogError, match="two publishers"):
+        read_columns(np.frombuffer(hostile.file(heads, *mixed), np.uint8), [parse_path("/a:x")])
+
+
+@pytest.mark.parametrize("text", ["", "/a", "/a:", ":x", "/a:x[", "/a:x[-1]", "/a:x..y", "/a:x.", "/a:[0]"])
+def test_what_is_no_field_path(text: str) -> None:
+    with pytest.raises(LogError, match="no field path"):
+        parse_path(text)
+
+
+def test_the_metadata_record_has_the_name_that_rigs_may_rely_on() -> None:
+    assert METADATA_NAME == "stribeck"
