@@ -27,7 +27,7 @@ TOLERANCE = 0.01  # of the height at which an end is taken as found
 
 @dataclass(frozen=True)
 class Interval:
-    """A 95 % interval; None for an end that the data do not bound."""
+    """A 95 % interval [unit of the parameter]; None for an end that the data do not bound."""
 
     low: float | None
     high: float | None

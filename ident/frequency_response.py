@@ -63,7 +63,7 @@ class ResponseFit:
     lowest_speed: float  # [rad/s], magnitude
     frequency: FloatArray  # (m,) of the lines [Hz]
     impedance: ComplexArray  # (m,) U/Q over j w, delay and hold taken out: b + j w J [N m s/rad]
-    weight: FloatArray  # (m,) of the lines in the fit, relative to the largest
+    weight: FloatArray  # (m,) of the lines in the fit, relative to the largest [-]
 
 
 @dataclass(frozen=True)

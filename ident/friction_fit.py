@@ -65,8 +65,8 @@ class FrictionFit:
 
     values: Mapping[str, float]
     free: tuple[str, ...]  # names of the free parameters, in the order of the covariance
-    covariance: FloatArray  # (p, p); infinite variance where the data do not feel a parameter
-    chi_square: float
+    covariance: FloatArray  # (p, p); infinite variance where the data do not feel a parameter [SI]
+    chi_square: float  # [-]
     report: str
     other_minimum: Mapping[str, float] | None  # a second one that fits as well
 

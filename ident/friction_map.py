@@ -62,7 +62,7 @@ class SteadyRun:
     torque: float  # mean as logged [N m]
     acceleration: float  # slope of the speed [rad/s^2]
     white_stderr: float  # of the mean torque, were the samples' scatter all [N m]
-    block_ratio: float  # variance of block means over what white scatter gives them
+    block_ratio: float  # variance of block means over what white scatter gives them [-]
     travel: float  # [rad], > 0
     swing: Swing  # of the torque within the run
     start_time: float  # [s]
