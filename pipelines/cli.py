@@ -183,7 +183,7 @@ def simulate(
     x0: Annotated[str, typer.Option("--x0", help="Start: x1,x2,x3 in rad, rad/s, rad/s.")] = "1,0,0",
     duration: Annotated[float, typer.Option("--duration", help="In s.")] = 20.0,
     encoder_counts: option.EncoderCounts = None,
-    form: Annotated[str, typer.Option("--format", help="csv or mcap.")] = "csv",
+    form: Annotated[str, typer.Option("--format", help="csv, mcap or parquet.")] = "csv",
     law: option.Law = "per-direction",
     compensator: option.Compensator = None,
     compensation_gain: option.CompensationGain = None,

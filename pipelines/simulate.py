@@ -14,9 +14,10 @@ import math
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 import numpy as np
+import pandas as pd
 
 from compensation.closed_loop import ClosedLoop, simulate, torque
 from compensation.controller import Controller
@@ -28,7 +29,8 @@ from ident.response import respond
 from pipelines.exit_status import RefusalError, UsageError
 from pipelines.results.folder import ResultFolder
 
-Format = Literal["csv", "mcap"]
+Format = Literal["csv", "mcap", "parquet"]
+FORMATS: Final[tuple[Format, ...]] = get_args(Format)
 HEADER: Final = ("t", "x1", "x2", "x3", "v", "u")
 OUTPUT_STEP: Final = 1e-3  # [s] between the rows of a continuous run
 MOST_ROWS: Final = 200_000  # of a continuous run
@@ -66,10 +68,10 @@ def parse_start(text: str) -> tuple[float, float, float]:
 
 def parse_format(word: str) -> Format:
     """The format of the trajectory; raises `UsageError`."""
-    if word in {"csv", "mcap"}:
-        return "csv" if word == "csv" else "mcap"
-    later = "parquet is not written yet" if word == "parquet" else f"{word!r} is no format"
-    raise UsageError(f"--format: {later}; give csv or mcap")
+    for form in FORMATS:
+        if word == form:
+            return form
+    raise UsageError(f"--format: {word!r} is no format; give {', '.join(FORMATS[:-1])} or {FORMATS[-1]}")
 
 
 def simulate_loop(
@@ -89,10 +91,14 @@ def simulate_loop(
 
 
 def write_trajectory(run: SimulatedRun, folder: ResultFolder, *, form: Format = "csv") -> Path:
-    """trajectory.csv, or trajectory.mcap: joint states, marked as simulated, and x2 on its own topic."""
+    """The trajectory, simulated as it is: a table as CSV or Parquet, or joint states and x2 as MCAP."""
+    table = np.column_stack((run.time, run.state, run.velocity, run.torque))
     if form == "csv":
-        table = np.column_stack((run.time, run.state, run.velocity, run.torque))
         return folder.write_csv("trajectory.csv", HEADER, table.tolist())
+    if form == "parquet":
+        frame = pd.DataFrame(table, columns=list(HEADER))
+        frame.attrs = {"simulated": True, "loop": run.loop}
+        return folder.write_bytes("trajectory.parquet", frame.to_parquet(index=False))
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "trajectory.mcap"
         write_mcap(
