@@ -64,6 +64,7 @@ FIGURE_6_DURATION: Final = 40.0  # [s]
 FIGURE_7_DURATION: Final = 5.0  # [s]
 STEP: Final = 5e-3  # [s] between the rows of figures 6 and 7
 FIGURE_9_GAINS: Final = np.linspace(0.8, 1.2, 201)  # r
+_GAINS: Final = f"n1 = {PROPORTIONAL_GAIN:g} N m/rad, n2 = {DERIVATIVE_GAIN:g} N m s/rad"
 _WORDS: Final = {
     "stribeck_shape": "beta [-]",
     "static_torque": "F_s [N m]",
@@ -134,10 +135,12 @@ def write_figures4_and_8(folder: ResultFolder) -> None:
     swept = with_folds(observer_gain_axis(limit), robot, robot, gains, compensation_gains=FIGURE_8_GAINS)
     exact, none = (extrema(robot, robot, gains, compensation_gain=r, observer_gain=swept) for r in (1.0, 0.0))
     write_extrema(folder, "figure4.csv", swept, {"exact": exact, "uncompensated": none})
-    folder.write_text("figure4.svg", svg_text(figure4(swept, exact, none, critical_gain=limit)))
+    folder.write_text(
+        "figure4.svg", svg_text(figure4(swept, exact, none, critical_gain=limit, subtitle=_GAINS))
+    )
     curves = {r: edges(robot, robot, gains, compensation_gain=r, observer_gain=swept) for r in FIGURE_8_GAINS}
     write_edges(folder, "figure8.csv", swept, curves)
-    folder.write_text("figure8.svg", svg_text(figure8(swept, curves, critical_gain=limit)))
+    folder.write_text("figure8.svg", svg_text(figure8(swept, curves, critical_gain=limit, subtitle=_GAINS)))
 
 
 def figure6_solutions() -> tuple[Trajectory, Trajectory]:
@@ -156,7 +159,10 @@ def write_figure6(folder: ResultFolder) -> None:
     ]
     folder.write_csv("figure6.csv", ("solution", "t", "x1", "x2", "x3"), rows)
     picture = figure6(
-        exact, perturbed, perturbation="compensation a hundred-thousandth too strong, r = 1 + 1e-5"
+        exact,
+        perturbed,
+        perturbation="compensation a hundred-thousandth too strong, r = 1 + 1e-5",
+        subtitle=f"{_GAINS}, L = {LOW_OBSERVER_GAIN:g} 1/s",
     )
     folder.write_text("figure6.svg", svg_text(picture))
 
@@ -171,7 +177,10 @@ def write_figure7(folder: ResultFolder) -> None:
         ("t", "x1", "x2", "x3", "u"),
         np.column_stack((found.time, found.state, applied)).tolist(),
     )
-    folder.write_text("figure7.svg", svg_text(figure7(found, torque=applied)))
+    folder.write_text(
+        "figure7.svg",
+        svg_text(figure7(found, torque=applied, subtitle=f"{_GAINS}, L = {OBSERVER_GAIN:g} 1/s")),
+    )
 
 
 def write_figure9(folder: ResultFolder) -> None:
@@ -179,7 +188,9 @@ def write_figure9(folder: ResultFolder) -> None:
     robot = symmetric_robot()
     found = diagram(ClosedLoop(robot, Controller(_gains(), robot)), "r", FIGURE_9_GAINS)
     write_diagram(folder, found, loop="continuous: inclusion (8)", name="figure9")
-    folder.write_text("figure9.svg", svg_text(figure9(found)))
+    folder.write_text(
+        "figure9.svg", svg_text(figure9(found, subtitle=f"{_GAINS}, L = {OBSERVER_GAIN:g} 1/s"))
+    )
 
 
 def _row(curves: tuple[StribeckCurve, ...], name: str) -> tuple[float, float, float]:
