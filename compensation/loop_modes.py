@@ -43,6 +43,7 @@ REVERSAL: Final = 0  # surface x2 = 0
 MOTION: Final = 1  # surface v = 0
 REST_MARGIN: Final = 256 * 2.220446049250313e-16  # rounding of the torque balance
 NEWTON_LIMIT: Final = 100
+UNSEEN: Final = 40.0  # exp(-40) is below rounding
 SLOWEST: Final = 1e-12  # [1/s] stands for an observer without gain or damping, whose estimate never settles
 
 
@@ -85,8 +86,11 @@ def series(
     order: int,
     coefficients: FloatArray,
     work: FloatArray,
-) -> None:
-    """Taylor coefficients of the state in a slip mode, all shapes 1, into rows 0..2 of `coefficients`."""
+) -> float:
+    """Taylor coefficients of the state in a slip mode, all shapes 1, into rows 0..2 of `coefficients`.
+
+    Returns for how long they hold: at many times v_s, E is lost in rounding, yet is back before v is small.
+    """
     k = parameters[(2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)]
     a1, a2, a3, k0, k2, kv = k[A1], k[A2], k[A3], k[K0], k[K2], k[KV]
     c1, c2, gain = k[C1], k[C2], k[GAIN]
@@ -120,6 +124,27 @@ def series(
                 slide += d3[j] * e[i - j]
         e[i + 1] = rate2 * fade * step
         w[i + 1] = ratev * slide * step
+    reach = inf
+    if -rate2 * p2[0] > order or -ratev * (p2[0] + p3[0]) > order:
+        reach = _reach(coefficients, order, rate2, ratev)
+    return reach
+
+
+@compiled
+def _reach(coefficients: FloatArray, order: int, rate2: float, ratev: float) -> float:
+    """Time within which neither exponent falls by more than `order`, nor from above to below UNSEEN."""
+    reach = inf
+    for k in range(1, order + 1):
+        two = coefficients[1, k]
+        for rate, start, term in (
+            (rate2, coefficients[1, 0], two),
+            (ratev, coefficients[1, 0] + coefficients[2, 0], two + coefficients[2, k]),
+        ):
+            exponent = -rate * start
+            if exponent > order and term != 0.0:
+                allowed = max(float(order), exponent - UNSEEN)
+                reach = min(reach, 0.5 * (allowed / abs(rate * term)) ** (1.0 / k))
+    return reach
 
 
 @compiled
@@ -150,6 +175,8 @@ def slide(signs: Signs, state: FloatArray, parameters: FloatArray) -> tuple[floa
         bound, way = k[LOW], -1
     if way != 0:
         there = _breakaway(k, side, x1, x2, last, bound)
+        if there == x2:
+            return 0.0, MOTION, way, 1  # the torque is beyond its bound already: no tangent departure
         return log1p((x2 - there) / (there - goal)) / k[RATE], MOTION, way, 2
     if crosses:
         return log1p(-x2 / goal) / k[RATE], REVERSAL, -signs[0], 1

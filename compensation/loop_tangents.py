@@ -79,9 +79,9 @@ def tangent_series(
     order: int,
     coefficients: FloatArray,
     work: FloatArray,
-) -> None:
+) -> float:
     """Taylor coefficients of the state and of two deviations into rows 0..8, all shapes 1."""
-    series(signs, state[:STATES], parameters, order, coefficients, work)
+    reach = series(signs, state[:STATES], parameters, order, coefficients, work)
     k = parameters[(2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)]
     alike = k[ALIKE] != 0.0
     d2, d3, dv, e, w = work[0], work[1], work[2], work[3], work[4]
@@ -114,6 +114,7 @@ def tangent_series(
                     slide += t3[j] * e[i - j] + d3[j] * te[i - j]
             te[i + 1] = rate2 * fade * step
             tw[i + 1] = ratev * slide * step
+    return reach
 
 
 @compiled

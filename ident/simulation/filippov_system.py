@@ -40,8 +40,12 @@ class FilippovSystem(NamedTuple):
 
     field: Callable[[Signs, FloatArray, FloatArray, FloatArray], None]
     """field(signs, state, parameters, out): writes dy/dt (n,); no sign is 0."""
-    series: Callable[[Signs, FloatArray, FloatArray, int, FloatArray, FloatArray], None]
-    """series(signs, state, parameters, order, coefficients, work): Taylor coefficients into rows 0..n-1."""
+    series: Callable[[Signs, FloatArray, FloatArray, int, FloatArray, FloatArray], float]
+    """series(signs, state, parameters, order, coefficients, work): Taylor coefficients into rows 0..n-1.
+
+    Returns the time for which they tell the whole truth, inf if the coefficients themselves show it: a term
+    that is too small to be seen now but grows within the step must be reached in shorter ones.
+    """
     slide: Callable[[Signs, FloatArray, FloatArray], tuple[float, int, int, int]]
     """slide(signs, state, parameters) -> how long, then which surface gets which sign at which contact."""
     slide_at: Callable[[Signs, FloatArray, FloatArray, float, FloatArray], None]
@@ -163,8 +167,9 @@ def no_series(
     order: int,
     coefficients: FloatArray,
     work: FloatArray,
-) -> None:
+) -> float:
     """Stands in a system that has no Taylor recurrence."""
+    return np.inf
 
 
 @specialised

@@ -52,6 +52,11 @@ END_REASONS: Final = (
 
 WORK_ROWS: Final = 20
 STALLED_EVENTS: Final = 200  # events at one instant, after which the step limit is declared reached
+HELD_EVENTS: Final = (
+    50  # events at one instant, after which a slide is held on for a little: rounding drives them
+)
+SHORTEST_CRAWL: Final = 1e-9  # [s] of that holding, doubled each time
+LONGEST_CRAWL: Final = 1e-2  # [s]
 BALANCE: Final = 1e-9  # of the rate on the other side: so slow a departure may be rounding
 
 
@@ -117,6 +122,7 @@ def integrate(
     found = 0
     stalled = 0
     suggested = 1e-2
+    crawl = SHORTEST_CRAWL
     for step in range(settings.step_limit):
         if time >= settings.end:
             return Progress(time, TIME_REACHED, output, events, step)
@@ -127,6 +133,9 @@ def integrate(
         arrived_from = 0
         if _slides(signs):
             duration, surface, side, touching = system.slide(signs, state, parameters)
+            if stalled > HELD_EVENTS:
+                duration = max(duration, crawl)
+                crawl = min(2.0 * crawl, LONGEST_CRAWL)
             span = min(duration, left)
             while output < wanted and record.times[output] <= time + span:
                 system.slide_at(signs, state, parameters, record.times[output] - time, record.states[output])

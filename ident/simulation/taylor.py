@@ -41,7 +41,7 @@ def taylor_step(
     """
     n = state.size
     order = order_for(tolerance)
-    system.series(signs, state, parameters, order, polynomials, work)
+    reach = system.series(signs, state, parameters, order, polynomials, work)
     if longest < 0.0:
         length = -longest
     else:
@@ -52,13 +52,13 @@ def taylor_step(
             size = max(size, abs(state[i]))
             last = max(last, abs(polynomials[i, order]))
             before = max(before, abs(polynomials[i, order - 1]))
-        length = longest
+        length = min(longest, reach)
         if last > 0.0:
             length = min(length, (tolerance * size / last) ** (1.0 / order))
         if before > 0.0:
             length = min(length, (tolerance * size / before) ** (1.0 / (order - 1)))
         if size == 0.0:
-            length = min(longest, 1e-3 / (1.0 + abs(last) ** (1.0 / order)))
+            length = min(length, 1e-3 / (1.0 + abs(last) ** (1.0 / order)))
     for i in range(n):
         power = 1.0
         for k in range(1, order + 1):

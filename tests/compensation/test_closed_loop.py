@@ -134,6 +134,23 @@ def test_agrees_with_scipy_from_event_to_event(seed: int) -> None:
     np.testing.assert_allclose(run.state[0], piecewise(case, start, 3.0), atol=1e-7)
 
 
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("shape", [1.0, 1.3])
+def test_friction_that_returns_from_below_rounding_is_not_missed(seed: int, shape: float) -> None:
+    case, start = random_loop(seed)
+    law = StribeckCurve(
+        static_torque=1.5,
+        coulomb_torque=1.0,
+        stribeck_velocity=0.1,
+        viscous_damping=0.0,
+        stribeck_shape=shape,
+    )
+    case = replace(case, robot=replace(case.robot, friction=StribeckFriction(law, law)))
+    fast = (5.0 * start[0], 20.0 * start[1], 20.0 * start[2])
+    run = simulate(case, fast, duration=2.0, times=[2.0], tolerance=1e-12)
+    np.testing.assert_allclose(run.state[0], piecewise(case, fast, 2.0), atol=1e-6)
+
+
 @pytest.mark.parametrize("seed", [2, 5])
 def test_implicit_time_stepping_converges_to_it_at_first_order(seed: int) -> None:
     case, start = random_loop(seed)
@@ -162,7 +179,10 @@ def test_every_end_reason_is_true(
         halfway = simulate(case, start, duration=2.5)
         if halfway.end_reason == "time reached":
             rest = simulate(case, halfway.end_state, duration=2.5)
-            np.testing.assert_allclose(rest.end_state, run.end_state, atol=1e-5)
+            tight = simulate(case, start, duration=5.0, tolerance=1e-13)
+            # where L is below critical, deviations grow: their growth is measured, not guessed
+            spread = float(np.max(np.abs(tight.end_state - run.end_state)))
+            np.testing.assert_allclose(rest.end_state, run.end_state, atol=1e-6 + 100 * spread)
 
 
 def test_torque_is_the_control_law() -> None:

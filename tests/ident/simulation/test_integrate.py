@@ -28,11 +28,12 @@ def field(signs: Signs, state: FloatArray, parameters: FloatArray, out: FloatArr
 @compiled
 def series(
     signs: Signs, state: FloatArray, parameters: FloatArray, order: int, c: FloatArray, work: FloatArray
-) -> None:
+) -> float:
     c[0, 0], c[1, 0] = state[0], state[1]
     for k in range(order):
         c[0, k + 1] = c[1, k] / (k + 1)
         c[1, k + 1] = (-c[0, k] - (parameters[0] * signs[0] if k == 0 else 0.0)) / (k + 1)
+    return np.inf
 
 
 @compiled
