@@ -13,7 +13,7 @@ class Event:
 
     time: float  # [s]
     kind: str
-    state: FloatArray  # (n,) on the surface
+    state: FloatArray  # (n,) on the surface [units of the system]
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,8 @@ class Trajectory:
     """A solution of a Filippov system."""
 
     time: FloatArray  # (k,) [s]
-    state: FloatArray  # (k, n)
+    state: FloatArray  # (k, n) [units of the system]
     events: tuple[Event, ...]
     end_reason: str  # "time reached", "equilibrium" or "step limit"
     end_time: float  # [s] of an equilibrium: since when the state slides for good
-    end_state: FloatArray  # (n,) at the end; of an equilibrium: where the state tends to
+    end_state: FloatArray  # (n,) [units of the system]; of an equilibrium: where the state tends to
