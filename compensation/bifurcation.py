@@ -44,7 +44,7 @@ SAMPLES: Final = 4000  # of a trajectory that is classified by its samples
 class Point:
     """One attractor, or equilibrium, at one value of the parameter."""
 
-    value: float
+    value: float  # of the parameter: r [-] or L [1/s]
     x1_min: float  # [rad]
     x1_max: float  # [rad]
     amplitude: float  # [rad] max|x1|
@@ -65,7 +65,7 @@ class Branch:
 class Bifurcation:
     """A value at which something appears or vanishes."""
 
-    value: float
+    value: float  # of the parameter: r [-] or L [1/s]
     kind: str
 
 
