@@ -129,10 +129,10 @@ def _row(curve: StribeckCurve) -> tuple[float, ...]:
 
 @dataclass(frozen=True)
 class _End:
-    time: float
-    reason: int
-    outputs: int
-    state: FloatArray
+    time: float  # [s]
+    reason: int  # index into END_REASONS
+    outputs: int  # wanted times that were reached
+    state: FloatArray  # (3,) [rad, rad/s, rad/s]
 
 
 def _run(

@@ -37,10 +37,10 @@ NEAR: Final = 1e-3  # relative distance from which shooting is tried
 class Returns:
     """A stretch of a return map: points and what happened on the way to each."""
 
-    points: FloatArray  # (k, d) coordinates on the section
+    points: FloatArray  # (k, d) coordinates on the section [units of the system]
     durations: FloatArray  # (k,) [s]
-    lows: FloatArray  # (k,) least value of the watched coordinate on the way
-    highs: FloatArray  # (k,) greatest
+    lows: FloatArray  # (k,) least x1 on the way [units of the system]
+    highs: FloatArray  # (k,) greatest x1 [units of the system]
     end_reason: str  # "section reached" if all returns were made
 
 
@@ -62,11 +62,11 @@ class ReturnMap(Protocol):
 class Cycle:
     """A limit cycle."""
 
-    point: FloatArray  # (d,) on the section
+    point: FloatArray  # (d,) on the section [units of the system]
     returns: int  # of the map, in a period or, of a symmetric cycle, in half of it
     period: float  # [s]
-    x1_min: float  # least value of the watched coordinate
-    x1_max: float  # greatest
+    x1_min: float  # least value of the watched coordinate [its unit]
+    x1_max: float  # greatest [its unit]
     multipliers: tuple[complex, ...]  # the largest first
     stable: bool
 
