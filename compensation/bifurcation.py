@@ -34,6 +34,7 @@ Kind = Literal["equilibrium_set", "equilibrium", "limit_cycle"]
 SET_POINT: Final = "set point"
 STARTS: Final = (0.6, -0.6, 0.1, -0.1)  # x1(0) [rad] from which cycles are looked for
 SAME_CYCLE: Final = 1e-6  # relative difference of extremes and period
+ONE_CHANGE: Final = 1e-9  # relative distance at which two changes are one
 EQUILIBRIUM_REFINEMENTS: Final = 45
 REFINEMENTS: Final = 12  # bisections of the ends of a branch
 CONTINUOUS: Final = 0.25  # amplitude at an onset, relative to the next point, below which it grows from zero
@@ -185,9 +186,9 @@ def _chained(found: Sequence[Sequence[Cycle]]) -> list[_Chain]:
         free = list(cycles)
         for chain in [chain for chain in chains if chain.last == index - 1]:
             if free:
-                nearest = min(free, key=lambda cycle: _distance(cycle, chain.cycles[-1]))
-                chain.cycles.append(nearest)
-                free.remove(nearest)
+                last = chain.cycles[-1]
+                distances = [_distance(cycle, last) for cycle in free]
+                chain.cycles.append(free.pop(distances.index(min(distances))))
         chains.extend(_Chain(index, [cycle]) for cycle in free)
     return chains
 
@@ -274,11 +275,15 @@ def _pushed_away(loop: ClosedLoop) -> bool:
 
 
 def _changes_of_equilibria(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> Iterator[Bifurcation]:
-    """Where pieces of the equilibrium set appear, vanish or leave the set point, by bisection."""
+    """Where pieces of the equilibrium set appear, vanish or leave the set point, by bisection.
+
+    Changes within rounding of each other are one: a grid value may lie on the change itself.
+    """
 
     def names(value: float) -> frozenset[tuple[str, bool]]:
         return frozenset(_pieces(with_gain(loop, parameter, value)))
 
+    changes: list[tuple[float, frozenset[tuple[str, bool]], frozenset[tuple[str, bool]]]] = []
     before = names(float(grid[0]))
     for low, high in itertools.pairwise(map(float, grid)):
         after = names(high)
@@ -287,7 +292,12 @@ def _changes_of_equilibria(loop: ClosedLoop, parameter: Parameter, grid: FloatAr
             for _ in range(EQUILIBRIUM_REFINEMENTS):
                 middle = 0.5 * (good + bad)
                 good, bad = (middle, bad) if names(middle) == before else (good, middle)
-            gone = ", ".join(sorted(name for name, _ in before - after)) or "none"
-            new = ", ".join(sorted(name for name, _ in after - before)) or "none"
-            yield Bifurcation(bad, f"equilibria change: {gone} ends, {new} begins")
+            first = before
+            if changes and bad - changes[-1][0] <= ONE_CHANGE * abs(bad):
+                bad, first, _ = changes.pop()
+            changes.append((bad, first, after))
         before = after
+    for value, first, last in changes:
+        gone = ", ".join(sorted(name for name, _ in first - last)) or "none"
+        new = ", ".join(sorted(name for name, _ in last - first)) or "none"
+        yield Bifurcation(value, f"equilibria change: {gone} ends, {new} begins")

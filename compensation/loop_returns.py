@@ -24,10 +24,12 @@ from ident.simulation.compiled import compiled, inlined
 from ident.simulation.dormand_prince import DORMAND_PRINCE
 from ident.simulation.filippov_system import FloatArray, OneStepMethod, Signs, assign
 from ident.simulation.integrate import SECTION, WORK_ROWS, Progress, Record, Settings, integrate
+from ident.simulation.integrate import STEP_LIMIT as STEPS_SPENT
 from ident.simulation.taylor import MAX_ORDER, TAYLOR
 
 EVENT_STORE: Final = 256  # of a half turn: chattering beyond that is reported as no return
 STEP_LIMIT: Final = 200_000
+MOST_HALTS: Final = 1000  # in a turn: a link that halts more often is chattering, not turning
 
 
 @inlined
@@ -71,7 +73,8 @@ def _returns(
     for row in range(points.shape[0]):
         duration = 0.0
         low = high = state[0]
-        while True:
+        returned = False
+        for _ in range(MOST_HALTS):
             before = state[0]
             end = _to_halt(
                 method, parameters, tolerance, patience, state, signs, contact, times, which, modes, states
@@ -81,7 +84,10 @@ def _returns(
             if end.reason != SECTION:
                 return row, end.reason
             if symmetric or state[0] > before:
+                returned = True
                 break
+        if not returned:
+            return row, STEPS_SPENT
         if symmetric:
             for i in range(STATES):
                 state[i] = -state[i]

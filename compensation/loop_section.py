@@ -10,6 +10,7 @@ import numpy as np
 
 from compensation.closed_loop import ClosedLoop, mode_parameters
 from compensation.loop_returns import (
+    MOST_HALTS,
     derivative_by_dormand_prince,
     derivative_by_series,
     returns_by_dormand_prince,
@@ -66,7 +67,7 @@ class LoopSection:
         """Derivative (2, 2) of one return from a point (2,)."""
         state = _state(point)
         slope = np.eye(2)
-        while True:
+        for _ in range(MOST_HALTS):
             before = state[0]
             once = np.empty((2, 2))
             kernel = derivative_by_series if self._analytic else derivative_by_dormand_prince
@@ -78,6 +79,7 @@ class LoopSection:
                 return -slope
             if state[0] > before:
                 return slope
+        return None
 
 
 def with_gain(loop: ClosedLoop, parameter: str, value: float) -> ClosedLoop:

@@ -6,7 +6,7 @@ import pytest
 from compensation.bifurcation import Branch, Diagram, diagram, where_it_ends
 from compensation.closed_loop import ClosedLoop
 from compensation.controller import Controller, Gains
-from ident.model.friction import ModelError
+from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
 
@@ -88,6 +88,38 @@ def test_at_r_1_the_equilibrium_set_vanishes_at_the_critical_gain() -> None:
 def test_where_a_start_ends(r: float, start: float, verdict: str) -> None:
     found = where_it_ends(loop(r, robot=asymmetric_robot()), (start, 0.0, 0.0), duration=30.0)
     assert found.verdict == verdict
+
+
+def test_a_grid_value_on_the_change_makes_no_second_change() -> None:
+    drawn = diagram(loop(), "r", np.array([0.9, 1.0, 1.1]))
+    (change,) = [b for b in drawn.bifurcations if "equilibria" in b.kind]
+    assert change.value == pytest.approx(1.0, abs=1e-9)
+    assert change.kind.endswith("around the set point ends, set point begins")
+
+
+def test_cycles_that_coexist_are_followed_side_by_side() -> None:
+    # beta = 1.5 under the mean law, whose return map has two stable cycles for some r
+    robot = OneLinkRobot(
+        0.04,
+        StribeckFriction(
+            positive=StribeckCurve(1.035, 0.69, 0.068, 0.132, 1.5),
+            negative=StribeckCurve(0.765, 0.51, 0.092, 0.108, 1.5),
+        ),
+    )
+    gains = Gains(proportional=0.776, derivative=0.0485, observer=154.798, compensation=1.0)
+    drawn = diagram(ClosedLoop(robot.mean(), Controller(gains, robot)), "r", np.linspace(1.1, 1.2, 5))
+    assert branches(drawn, "limit_cycle")
+
+
+def test_a_link_that_halts_without_turning_ends_the_search() -> None:
+    curves = (
+        StribeckCurve(1.04071774, 0.7255979912, 0.0767425807, 1.0850740295, 1.5),
+        StribeckCurve(0.9592822593, 0.6688204238, 0.0832574193, 1.0850740295, 1.5),
+    )
+    robot = OneLinkRobot(0.0924752375, StribeckFriction(*curves))
+    gains = Gains(0.22089940669903593, 0.07280431746623534, observer=66.22759672732795, compensation=1.04)
+    drawn = diagram(ClosedLoop(robot, Controller(gains, robot.mean())), "r", np.array([1.04, 1.041]))
+    assert drawn.branches
 
 
 def test_bad_input_is_named() -> None:
