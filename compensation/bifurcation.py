@@ -136,7 +136,7 @@ def _is_on(cycle: Cycle, extremes: Sequence[float]) -> bool:
     return all(cycle.x1_min - slack <= x1 <= cycle.x1_max + slack for x1 in extremes)
 
 
-def _cycle_branches(loops: Sequence[ClosedLoop]) -> list[_Chain]:
+def _cycle_branches(loops: Sequence[ClosedLoop]) -> list[Chain]:
     """Stable cycles by branch: followed upwards with new starts, then downwards from what was found."""
     sections = [LoopSection(loop) for loop in loops]
     starts = [np.array([x1, 0.0]) for x1 in (STARTS[:1] if sections[0].symmetric else STARTS)]
@@ -151,7 +151,7 @@ def _cycle_branches(loops: Sequence[ClosedLoop]) -> list[_Chain]:
         for cycle in found[index + 1]:
             if len(found[index]) < len(found[index + 1]):
                 _add(found[index], find_cycle(sections[index], cycle.point))
-    return _chained(found)
+    return chained(found)
 
 
 def _add(known: list[Cycle], candidate: Cycle | NoCycle) -> None:
@@ -169,7 +169,7 @@ def _distance(one: Cycle, other: Cycle) -> float:
 
 
 @dataclass(frozen=True)
-class _Chain:
+class Chain:
     """A branch of cycles over consecutive values of the grid."""
 
     first: int  # index of the first value
@@ -180,8 +180,9 @@ class _Chain:
         return self.first + len(self.cycles) - 1
 
 
-def _chained(found: Sequence[Sequence[Cycle]]) -> list[_Chain]:
-    chains: list[_Chain] = []
+def chained(found: Sequence[Sequence[Cycle]]) -> list[Chain]:
+    """Cycles at consecutive values, joined to branches: each branch goes on with the nearest cycle left."""
+    chains: list[Chain] = []
     for index, cycles in enumerate(found):
         free = list(cycles)
         for chain in [chain for chain in chains if chain.last == index - 1]:
@@ -189,11 +190,11 @@ def _chained(found: Sequence[Sequence[Cycle]]) -> list[_Chain]:
                 last = chain.cycles[-1]
                 distances = [_distance(cycle, last) for cycle in free]
                 chain.cycles.append(free.pop(distances.index(min(distances))))
-        chains.extend(_Chain(index, [cycle]) for cycle in free)
+        chains.extend(Chain(index, [cycle]) for cycle in free)
     return chains
 
 
-def _cycle_branch(chain: _Chain, grid: FloatArray) -> Branch:
+def _cycle_branch(chain: Chain, grid: FloatArray) -> Branch:
     values = grid[chain.first : chain.last + 1]
     points = [
         Point(float(value), c.x1_min, c.x1_max, c.amplitude, c.period, c.multipliers)
@@ -203,7 +204,7 @@ def _cycle_branch(chain: _Chain, grid: FloatArray) -> Branch:
 
 
 def _ends_of_cycles(
-    loop: ClosedLoop, parameter: Parameter, grid: FloatArray, chains: Sequence[_Chain]
+    loop: ClosedLoop, parameter: Parameter, grid: FloatArray, chains: Sequence[Chain]
 ) -> Iterator[Bifurcation]:
     """Where branches of cycles begin or end inside the grid, by bisection."""
     for chain in chains:

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from compensation.bifurcation import Branch, Diagram, diagram, where_it_ends
+from compensation.bifurcation import Branch, Diagram, chained, diagram, where_it_ends
 from compensation.closed_loop import ClosedLoop
 from compensation.controller import Controller, Gains
+from compensation.orbits.periodic_orbits import Cycle
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
@@ -97,19 +98,15 @@ def test_a_grid_value_on_the_change_makes_no_second_change() -> None:
     assert change.kind.endswith("around the set point ends, set point begins")
 
 
-def test_cycles_that_coexist_are_followed_side_by_side() -> None:
-    # beta = 1.5 below the critical gain: the return map has two stable cycles for some r
-    robot = OneLinkRobot(
-        0.04,
-        StribeckFriction(
-            positive=StribeckCurve(1.035, 0.69, 0.068, 0.132, 1.5),
-            negative=StribeckCurve(0.765, 0.51, 0.092, 0.108, 1.5),
-        ),
-    )
-    gains = Gains(proportional=0.776, derivative=0.0485, observer=100.0, compensation=1.0)
-    drawn = diagram(ClosedLoop(robot, Controller(gains, robot)), "r", np.linspace(1.0, 1.1, 9))
-    values = [point.value for branch in branches(drawn, "limit_cycle") for point in branch.points]
-    assert len(values) > len(set(values))
+def test_cycles_that_coexist_are_chained_each_to_its_nearest() -> None:
+    def cycle(size: float) -> Cycle:
+        return Cycle(np.array([size, 0.0]), 1, 6.0, -size, size, (0.1, 0.0), stable=True)
+
+    chains = chained([[cycle(0.3)], [cycle(0.5), cycle(0.31)], [cycle(0.32), cycle(0.52)]])
+    assert [(chain.first, [c.amplitude for c in chain.cycles]) for chain in chains] == [
+        (0, [0.3, 0.31, 0.32]),
+        (1, [0.5, 0.52]),
+    ]
 
 
 def test_a_link_that_halts_without_turning_ends_the_search() -> None:
