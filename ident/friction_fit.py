@@ -190,7 +190,7 @@ def _covariance(data: FitData, values: Mapping[str, float], free: Sequence[str])
 def _starts(data: FitData) -> list[dict[str, float]]:
     """Starts from the linear problem on a grid of v_s: the local minima first, then the rest spread out."""
     ranked = {direction: _ranked(data, direction) for direction in DIRECTIONS}
-    inertia = _start_inertia(data)
+    inertia = start_inertia(data) or 0.0
     starts = []
     for number in range(STARTS):
         values = {"inertia": inertia}
@@ -234,8 +234,11 @@ def _ranked(data: FitData, direction: Direction) -> list[dict[str, float]]:
     ]
 
 
-def _start_inertia(data: FitData) -> float:
-    """J from the frequency response, else from the momenta with the friction read off the steady runs."""
+def start_inertia(data: FitData) -> float | None:
+    """J from the frequency response, else from the momenta with the friction read off the steady runs.
+
+    None where nothing knows it.
+    """
     if data.inertia is not None:
         return data.inertia[0]
     guesses = []
@@ -244,9 +247,10 @@ def _start_inertia(data: FitData) -> float:
         order = np.argsort(data.speed[own])
         middle = motion.nodes.mean(axis=1)
         friction = np.interp(middle, data.speed[own][order], data.torque[own][order]) * motion.duration
-        guesses.append(float(np.sum(motion.impulse - friction) / np.sum(motion.gain)))
+        gained = float(np.sum(motion.gain))
+        guesses.append(float(np.sum(motion.impulse - friction)) / gained if gained > 0 else 0.0)
     sound = [guess for guess in guesses if guess > 0]
-    return float(np.median(sound)) if sound else 1.0
+    return float(np.median(sound)) if sound else None
 
 
 def _other_minimum(results: Sequence[lmfit.minimizer.MinimizerResult]) -> Mapping[str, float] | None:

@@ -128,6 +128,9 @@ def _smoothed_speeds(recording: Recording, first: int, past: int) -> tuple[Float
     """
     before = max(first - (past - first) // RUN_IN, 0)
     kept = np.arange(before, past, -(-(past - before) // SMOOTHED))
-    motion = differentiate(recording.time[kept], recording.position[kept], resolution=recording.resolution)
+    # Where the position is noisier than its counts, the noise is taken from the log.
+    counted = recording.resolution is not None and grain(recording) <= recording.resolution
+    resolution = recording.resolution if counted else None
+    motion = differentiate(recording.time[kept], recording.position[kept], resolution=resolution)
     samples = np.arange(first, past)
     return np.interp(samples, kept, motion.velocity), np.interp(samples, kept, motion.velocity_stderr)

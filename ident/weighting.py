@@ -23,6 +23,7 @@ from ident.friction_fit import (
     FrictionFit,
     fit_friction,
     friction_torque,
+    start_inertia,
 )
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
@@ -30,7 +31,9 @@ from ident.momentum import Momentum
 from ident.response import breakaway_delay
 from ident.variance_model import RunSpread, run_spread, white_variance
 
-ROUNDS = 5
+ROUNDS = 5  # of the steady runs alone
+MOST_ROUNDS = 12  # with the motion
+SETTLED = 0.02  # standard errors by which a round may still move the fit
 FIRST_SPREAD = 0.01  # of the torque, before anything is known
 PRIOR_STARTS = 4.0  # breakaways that the runs' spread is worth
 
@@ -45,13 +48,29 @@ class Weighted:
 
 
 def settle(evidence: Evidence, *, free_beta: bool) -> Weighted:
-    """Fit, weigh anew, and fit again until the weights have settled; from many starts first and last."""
-    data = _first_data(evidence)
-    fit = fit_friction(data, free_beta=False)
-    spread = RunSpread(0.0, np.inf)
-    for number in range(ROUNDS):
-        data, spread = _reweighted(evidence, data, fit)
-        fit = fit_friction(data, free_beta=free_beta, start=None if number == ROUNDS - 1 else fit)
+    """Fit, weigh anew, and fit again until the weights have settled; from many starts first and last.
+
+    The steady runs and breakaways settle alone first, and theirs is the spread between runs. The motion joins
+    afterwards, with a misfit of its own as seen from their law: however wrong it is, it can neither bend the
+    steady runs nor make them look worse than they are.
+    """
+    first = _first_data(evidence)
+    inertia = _known_inertia(evidence, first)
+    alone = _settle_steady(evidence, first, inertia=inertia, free_beta=free_beta)
+    if not evidence.momenta or inertia is None:
+        return alone
+    spread = alone.spread
+    fit = replace(alone.fit, values={**alone.fit.values, "inertia": inertia})
+    fit = replace(fit, values={**fit.values, "inertia": _balanced_inertia(evidence.momenta, fit, spread)})
+    data = first
+    for number in range(MOST_ROUNDS):
+        data = _reweighted(evidence, data, fit, spread)
+        again = fit_friction(data, free_beta=free_beta, start=fit)
+        change = _change(fit, again)
+        fit = again
+        if number >= 1 and change < SETTLED:
+            break
+    fit = fit_friction(data, free_beta=free_beta, start=None)
     return Weighted(data, fit, spread)
 
 
@@ -59,12 +78,60 @@ def with_inertia(
     evidence: Evidence, weighted: Weighted, inertia: tuple[float, float], *, free_beta: bool
 ) -> Weighted:
     """The settled fit with one datum more: an inertia and its standard error."""
-    data, fit, spread = replace(weighted.data, inertia=inertia), weighted.fit, weighted.spread
+    torque = _first_data(evidence)
+    data = replace(
+        weighted.data,
+        inertia=inertia,
+        torque=torque.torque,
+        acceleration=torque.acceleration,
+    )
+    fit = replace(weighted.fit, values={**weighted.fit.values, "inertia": inertia[0]})
     fit = fit_friction(data, free_beta=free_beta, start=fit)
     for _ in range(2):
-        data, spread = _reweighted(evidence, data, fit)
+        data = _reweighted(evidence, data, fit, weighted.spread)
         fit = fit_friction(data, free_beta=free_beta, start=fit)
-    return Weighted(data, replace(fit, other_minimum=weighted.fit.other_minimum), spread)
+    return Weighted(data, replace(fit, other_minimum=weighted.fit.other_minimum), weighted.spread)
+
+
+def _settle_steady(evidence: Evidence, first: FitData, *, inertia: float | None, free_beta: bool) -> Weighted:
+    """The fit of steady runs and breakaways; what their speed still changes is taken off with `inertia`.
+
+    Where no inertia is known, that small term stays in.
+    """
+    torque = first.torque - (inertia or 0.0) * first.acceleration
+    data = replace(first, torque=torque, acceleration=np.zeros_like(torque), momenta=(), whitening=())
+    fit = fit_friction(data, free_beta=False)
+    spread = RunSpread(0.0, np.inf)
+    for number in range(ROUNDS):
+        seen = replace(fit, values={**fit.values, "inertia": inertia or 0.0})
+        spread = _spread_of(evidence, data, seen)
+        data = _reweighted(evidence, data, seen, spread)
+        fit = fit_friction(data, free_beta=free_beta, start=None if number == ROUNDS - 1 else fit)
+    return Weighted(data, fit, spread)
+
+
+def _known_inertia(evidence: Evidence, data: FitData) -> float | None:
+    """J from the frequency response, else roughly from the motion; None where neither tells."""
+    return evidence.response.inertia if evidence.response is not None else start_inertia(data)
+
+
+def _balanced_inertia(momenta: Sequence[Momentum], fit: FrictionFit, spread: RunSpread) -> float:
+    """The J that balances the motion under the law of the steady runs, by weighted least squares."""
+    inertia = fit.values["inertia"]
+    left, right = 0.0, 0.0
+    for motion in momenta:
+        law = fit.law("positive" if motion.direction > 0 else "negative")
+        whitening = _whitening(motion, inertia, spread, scale=1.0)
+        gain = whitening @ motion.gain
+        left += float(gain @ (whitening @ motion.residual(0.0, law)))
+        right += float(gain @ gain)
+    return left / right if left > 0 else inertia
+
+
+def _change(fit: FrictionFit, again: FrictionFit) -> float:
+    """Largest change of a parameter from one fit to the next, in its standard errors."""
+    change = np.array([again.values[name] - fit.values[name] for name in again.free])
+    return float(np.max(np.abs(change) / np.sqrt(np.diag(again.covariance))))
 
 
 def fitted_robot(fit: FrictionFit) -> OneLinkRobot | None:
@@ -104,40 +171,56 @@ def _first_data(evidence: Evidence) -> FitData:
     )
 
 
-def _reweighted(evidence: Evidence, data: FitData, fit: FrictionFit) -> tuple[FitData, RunSpread]:
+def _spread_of(evidence: Evidence, data: FitData, fit: FrictionFit) -> RunSpread:
+    """The spread between runs that the residuals of a fit show."""
+    residual, own = _run_residuals(data, fit), _own_variance(evidence, data, fit)
+    travel = np.array([run.travel for run in evidence.used_runs])
+    return run_spread(residual, travel, own, parameters=sum(name != "inertia" for name in fit.free))
+
+
+def _own_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatArray:
+    """What a run's own noise and the error of its speed make of its torque's variance (n,) [(N m)^2]."""
+    runs = evidence.used_runs
+    return white_variance(runs) + (_slopes(data, fit) * np.array([run.velocity_stderr for run in runs])) ** 2
+
+
+def _reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: RunSpread) -> FitData:
     runs, starts = evidence.used_runs, evidence.used_starts
-    parameters = sum(name != "inertia" for name in fit.free)
-    residual, slope = _run_residuals(data, fit)
-    own = white_variance(runs) + (slope * np.array([run.velocity_stderr for run in runs])) ** 2
     travel = np.array([run.travel for run in runs])
-    spread = run_spread(residual, travel, own, parameters)
     start_torque, delay_error = _onset_torque(starts, fit)
     line = np.hypot(np.array([start.line.stderr for start in starts]), delay_error)
     place = _place_spread(data, fit, start_torque, line, spread)
     scale = _motion_scale(data.momenta, fit, spread)
-    weighted = replace(
+    return replace(
         data,
-        run_stderr=np.sqrt(own + spread.variance(travel)),
+        run_stderr=np.sqrt(_own_variance(evidence, data, fit) + spread.variance(travel)),
         start_torque=start_torque,
         start_stderr=np.sqrt(line**2 + place),
         whitening=tuple(
             _whitening(motion, fit.values["inertia"], spread, scale=scale) for motion in data.momenta
         ),
     )
-    return weighted, spread
 
 
-def _run_residuals(data: FitData, fit: FrictionFit) -> tuple[FloatArray, FloatArray]:
-    """Torque less the law's (n,) [N m], and the law's slope (n,) [N m s/rad]."""
-    residual, slope = np.zeros_like(data.torque), np.zeros_like(data.torque)
+def _run_residuals(data: FitData, fit: FrictionFit) -> FloatArray:
+    """Torque less the law's (n,) [N m]."""
+    residual = np.zeros_like(data.torque)
+    for direction in DIRECTIONS:
+        own = data.run_direction == SIGN[direction]
+        predicted = friction_torque(fit.law(direction), data.speed[own])
+        residual[own] = data.torque[own] - predicted - fit.values["inertia"] * data.acceleration[own]
+    return residual
+
+
+def _slopes(data: FitData, fit: FrictionFit) -> FloatArray:
+    """The law's slope at each run (n,) [N m s/rad]."""
+    slope = np.zeros_like(data.torque)
     for direction in DIRECTIONS:
         own = data.run_direction == SIGN[direction]
         law, speed = fit.law(direction), data.speed[own]
-        predicted = friction_torque(law, speed) + fit.values["inertia"] * data.acceleration[own]
-        residual[own] = data.torque[own] - predicted
         step = 1e-4 * speed
         slope[own] = (friction_torque(law, speed + step) - friction_torque(law, speed - step)) / (2 * step)
-    return residual, slope
+    return slope
 
 
 def _onset_torque(starts: Sequence[Breakaway], fit: FrictionFit) -> tuple[FloatArray, FloatArray]:

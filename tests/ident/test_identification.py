@@ -245,3 +245,39 @@ def test_a_stick_slip_run_is_left_out_and_listed() -> None:
     assert not use.used
     assert "E-STICKSLIP" in str(use.why)
     assert robot.positive["coulomb_torque"].value == pytest.approx(0.399, rel=0.01)
+
+
+def test_noisy_positions_spoil_neither_the_inertia_nor_the_steady_law() -> None:
+    rig, generator = Rig(torque_noise=0.005), np.random.default_rng(22)
+    logs = [
+        replace(log, position=log.position + 5e-4 * generator.standard_normal(log.position.size))
+        for log in [*_speeds(rig, generator), *_ramps(rig, generator)]
+    ]
+    found = identify(logs)
+    for parameter, estimate, truth in _estimates(found, rig):
+        assert estimate.value == pytest.approx(truth, rel=TOLERANCE.get(parameter, 0.02)), parameter
+
+
+def test_a_torque_logged_late_does_not_bend_the_steady_law() -> None:
+    rig, generator = Rig(torque_noise=0.005), np.random.default_rng(23)
+    late = 15
+    logs = [
+        replace(log, torque=np.concatenate([np.full(late, log.torque[0]), log.torque[:-late]]))
+        for log in [*_speeds(rig, generator), *_ramps(rig, generator)]
+    ]
+    found = identify(logs)
+    for parameter, estimate, truth in _estimates(found, rig):
+        assert estimate.value == pytest.approx(truth, rel=TOLERANCE.get(parameter, 0.04)), parameter
+
+
+def test_an_unknown_inertia_is_not_taken_for_one() -> None:
+    rig, generator = RIGS["light"], np.random.default_rng(24)
+    logs = [
+        rig.speeds([log_speed], generator, log=f"{log_speed:.4g}", wobble=0.02, duration=4.1)
+        for speed in rig.robot.friction.positive.stribeck_velocity * np.geomspace(0.08, 20.0, 12)
+        for log_speed in (float(speed), -float(speed))
+    ]
+    found = identify(logs)
+    assert found.robot.inertia.value is None
+    for parameter, estimate, truth in _estimates(found, rig)[1:]:
+        assert estimate.value == pytest.approx(truth, rel=2 * TOLERANCE[parameter]), parameter
