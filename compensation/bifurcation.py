@@ -177,6 +177,7 @@ class Chain:
 
     @property
     def last(self) -> int:
+        """Index of the last value."""
         return self.first + len(self.cycles) - 1
 
 
