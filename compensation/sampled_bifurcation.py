@@ -2,8 +2,8 @@ r"""Where the sampled loop ends up over r or L: limit cycles found by simulation
 
 The continuous loop's branches can be continued, see `bifurcation`. The loop as a rig runs it, with a sample
 period and encoder counts, is a discrete map with rounding: its cycles are found by running it. At every value
-of the parameter it runs from two starts, far out on either side, long enough to settle; what the position
-does at the end is judged as a recording would be (`orbits.steady_state`). The larger cycle of the two counts.
+of the parameter it runs from two starts, far out on either side, until it is known what becomes of it
+(`sampled_ends`). The larger cycle of the two counts.
 Where neighbouring values end up differently the onset between them is bisected.
 
 Its rests: between samples nothing distinguishes a sampled from a continuous controller once the link and the
@@ -17,19 +17,16 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from compensation.bifurcation import Bifurcation, Branch, Point
 from compensation.controller import Controller
-from compensation.orbits.steady_state import classify
-from compensation.sampled_loop import Map, Sampling, run_many
+from compensation.sampled_ends import MOST_SAMPLES, SampledEnd, sampled_end
+from compensation.sampled_loop import Map, Sampling
 from ident.model.robot import OneLinkRobot
 
-FloatArray = NDArray[np.float64]
 _TURNS: Final = 40.0  # of the undamped loop, 2 pi sqrt(J/n1), that a run lasts
 _START: Final = 1.2  # of F_s/n1, the largest rest error without compensation
-_BATCH: Final = 8  # runs that are held in memory at a time
+_STRETCHES: Final = (0.5, 1.0)  # of that time, after which a run is judged
+_BATCH: Final = 8  # values between two ticks
 _BISECTIONS: Final = 7  # of the interval of the sweep that an onset lies in
 _ONSET: Final = "onset of limit cycling (sampled)"
 
@@ -41,7 +38,7 @@ class SampledCycles:
     branches: tuple[Branch, ...]
     onsets: tuple[Bifurcation, ...]
     undecided: tuple[float, ...]  # [parameter's unit] values where a run was neither rest nor cycle
-    duration: float  # of each run [s]
+    duration: float  # of a run, at most [s]
     starts: tuple[float, ...]  # x1 [rad], with v = 0
 
 
@@ -56,24 +53,22 @@ def sampled_cycles(
     tick: Callable[[int], None] | None = None,
 ) -> SampledCycles:
     """Limit cycles over `values` of r [-] or L [1/s], rising; `tick` hears how many values are done."""
-    duration = settling_time(robot, controller)
+    most = MOST_SAMPLES * sampling.period
+    duration = min(settling_time(robot, controller), most)
     far = _START * max(_static(robot)) / controller.gains.proportional
     starts = (far, -far)
 
     def ends(batch: Sequence[float]) -> list[Point | str]:
-        controllers = [with_gain(controller, parameter, value) for value in batch for _ in starts]
-        positions = run_many(
-            [robot],
-            controllers,
-            sampling,
-            starts=[(x1, 0.0) for _ in batch for x1 in starts],
-            duration=duration,
-            map=map,
-        )
+        runs = [(with_gain(controller, parameter, value), x1) for value in batch for x1 in starts]
+        found = list(map(watched, runs))
         return [
-            _larger([_judged(value, run, sampling) for run in positions[2 * k : 2 * k + 2]])
+            _larger([_judged(value, run) for run in found[2 * k : 2 * k + 2]])
             for k, value in enumerate(batch)
         ]
+
+    def watched(run: tuple[Controller, float]) -> SampledEnd:
+        stretches = [part * duration for part in _STRETCHES]
+        return sampled_end(robot, run[0], sampling, start=run[1], stretches=stretches)
 
     found: list[Point | str] = []
     for first in range(0, len(values), _BATCH):
@@ -110,20 +105,17 @@ def _static(robot: OneLinkRobot) -> tuple[float, float]:
     return robot.friction.positive.static_torque, robot.friction.negative.static_torque
 
 
-def _judged(value: float, position: FloatArray, sampling: Sampling) -> Point | str:
+def _judged(value: float, end: SampledEnd) -> Point | str:
     """The cycle that a run ends in as a point, else the verdict."""
-    time = sampling.period * np.arange(position.size, dtype=np.float64)
-    state = classify(time, position, resolution=sampling.resolution)
-    if state.verdict != "limit_cycle" or state.period is None or state.amplitude is None:
+    state = end.state
+    if state.amplitude is None or end.x1_min is None or end.x1_max is None:
         return state.verdict
-    last = position[time >= time[-1] - state.period]
     return Point(
         value=float(value),
-        x1_min=float(last.min()),
-        x1_max=float(last.max()),
+        x1_min=end.x1_min,
+        x1_max=end.x1_max,
         amplitude=state.amplitude,
         period=state.period,
-        multipliers=(),
     )
 
 

@@ -11,6 +11,11 @@ The motor holds u_k until the next sample, `delay` samples later than it was mea
 command arrives the torque is 0. Between samples the robot moves exactly (`ident.response`). With h and the
 resolution going to 0 this is inclusion (8). A rig differs from it by a few per cent where it matters: the
 encoder's counts move the onset of limit cycling more than the sample period does.
+
+A run ends before its time in two ways, both certain. At rest for good: the link stands and a step changes
+neither z nor what the motor waits for, bit for bit, so no later sample can differ. Run away: a controller
+that samples too slowly for its own gains (Euler's observer diverges from L h = 2 on) lets its estimate grow
+without bound; a million times faster than anything in the loop is no motion of a rig any more.
 """
 
 from __future__ import annotations
@@ -18,7 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol, TypeVar
+from typing import Final, Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +37,9 @@ from ident.simulation.compiled import compiled
 
 FloatArray = NDArray[np.float64]
 _Settings = tuple[float, float, bool, int, float, float]  # h, resolution, exact?, delay, limit, reference
+_FASTEST: Final = 1e6  # times the speeds of the loop: an estimate beyond has run away
+ENDS: Final = ("time reached", "at rest for good", "runs away")
+_REACHED, _AT_REST, _AWAY = range(3)
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -75,6 +83,7 @@ class SampledRun:
     velocity: FloatArray  # true v [rad/s]
     estimate: FloatArray  # v_hat [rad/s]
     torque: FloatArray  # [N m], held by the motor from this sample to the next
+    end: str = ENDS[_REACHED]  # of `ENDS`; a run that ran away is cut short there
 
 
 @compiled
@@ -95,36 +104,92 @@ def _run(
     plant: FloatArray,
     controller: FloatArray,
     settings: _Settings,
-    start: tuple[float, float],
+    memory: FloatArray,
+    pending: FloatArray,
     rows: FloatArray,
-) -> None:
-    """Fill `rows` (5, n), measured first, or (1, m) with every so-many-th measured position only.
+) -> tuple[int, int]:
+    """Go on from `memory` and `pending` and fill `rows` (5, n), measured first, or (1, n), measured only.
 
-    `controller` (15,) holds n1, n2, L, r and the `law_array` of its model.
+    `controller` (15,) holds n1, n2, L, r and the `law_array` of its model; `memory` (5,) q, v, z, the number
+    of samples so far and the speed of an estimate that has run away; `pending` (delay + 1,) the torques on
+    their way. Returns how many samples were made and the number of the end in `ENDS`; after a rest for good
+    all rows are filled.
     """
     period, resolution, exact, delay, limit, reference = settings
     n1, n2, gain, scale = controller[0], controller[1], controller[2], controller[3]
     model = controller[4:]
-    position, velocity = start
-    pending = np.zeros(delay + 1)
-    z = 0.0
-    for k in range(rows.shape[1]):
+    position, velocity, z, fastest = memory[0], memory[1], memory[2], memory[4]
+    first = int(memory[3])
+    made, end = rows.shape[1], 0
+    for j in range(rows.shape[1]):
+        k = first + j
         measured = resolution * np.rint(position / resolution) if resolution > 0.0 else position
         if k == 0:
             z = -gain * measured
         estimate = z + gain * measured
+        if not abs(estimate) <= fastest:
+            made, end = j, 2
+            break
         feedback = n1 * (reference - measured) - n2 * estimate
         command = feedback + scale * _compensation(estimate, model)
         pending[k % (delay + 1)] = min(max(command, -limit), limit)
         torque = pending[(k + 1) % (delay + 1)]
-        rows[0, k] = measured
+        rows[0, j] = measured
         if rows.shape[0] == 5:
-            rows[1, k], rows[2, k], rows[3, k], rows[4, k] = position, velocity, estimate, torque
+            rows[1, j], rows[2, j], rows[3, j], rows[4, j] = position, velocity, estimate, torque
+        before, place, speed = z, position, velocity
         if exact:
             z += exact_change(estimate, feedback, period, gain, model)
         else:
             z += euler_change(estimate, feedback, period, gain, model)
         position, velocity = advance_with_ripple(position, velocity, torque, period, plant)
+        still = speed == 0.0 and velocity == 0.0 and position == place and z == before
+        if still and np.all(pending == torque):
+            for row in range(rows.shape[0]):
+                rows[row, j + 1 :] = rows[row, j]
+            made, end = j + 1, 1
+            break
+    memory[0], memory[1], memory[2], memory[3] = position, velocity, z, first + made
+    return made, end
+
+
+class LongRun:
+    """A run that is watched stretch by stretch, each going on where the last one ended."""
+
+    def __init__(
+        self,
+        robot: OneLinkRobot,
+        controller: Controller,
+        sampling: Sampling,
+        *,
+        start: tuple[float, float],
+        reference: float = 0.0,
+        ripple: TorqueRipple = NO_RIPPLE,
+    ) -> None:
+        """From q [rad] and v [rad/s]; raises `ModelError` for a start or reference that is not finite."""
+        if not all(map(math.isfinite, (*start, reference))):
+            raise ModelError(f"start {start}, reference {reference} rad: finite numbers")
+        gains, model = controller.gains, controller.model.friction
+        turning = math.sqrt(gains.proportional / robot.inertia)
+        speeds = (model.positive.stribeck_velocity, model.negative.stribeck_velocity, abs(start[1]))
+        fastest = _FASTEST * (sum(speeds) + turning * abs(reference - start[0]))
+        self._plant, self._controller = plant_array(robot, ripple), _controller_array(controller)
+        self._settings = _settings(sampling, reference)
+        self._memory = np.array([start[0], start[1], 0.0, 0.0, fastest])
+        self._pending = np.zeros(sampling.delay + 1)
+        self.end = ENDS[_REACHED]
+
+    def fill(self, rows: FloatArray) -> int:
+        """The next samples into `rows` (1, n), measured only, or (5, n); returns how many were run.
+
+        A run at rest for good is filled up with its last sample; one that ran away leaves the rows after it
+        as they are. Both go on no further.
+        """
+        if self.end != ENDS[_REACHED]:
+            raise ModelError(f"a run that has ended ({self.end}) does not go on")
+        made, end = _run(self._plant, self._controller, self._settings, self._memory, self._pending, rows)
+        self.end = ENDS[end]
+        return int(made)
 
 
 def run_sampled(
@@ -139,20 +204,23 @@ def run_sampled(
 ) -> SampledRun:
     """One run from q [rad] and v [rad/s] for `duration` [s], towards the `reference` q_r [rad].
 
-    The last sample is the last one not after `duration`. Raises `ModelError` for a start, duration or
-    reference that is not finite.
+    The last sample is the last one not after `duration`, or before the controller runs away. Raises
+    `ModelError` for a start, duration or reference that is not finite.
     """
     rows = _checked_rows(5, start, duration, sampling, reference)
-    _run(
-        plant_array(robot, ripple),
-        _controller_array(controller),
-        _settings(sampling, reference),
-        (float(start[0]), float(start[1])),
-        rows,
-    )
+    run = LongRun(robot, controller, sampling, start=start, reference=reference, ripple=ripple)
+    made = run.fill(rows)
+    if run.end == ENDS[_AWAY]:
+        rows = rows[:, :made]
     time = sampling.period * np.arange(rows.shape[1], dtype=np.float64)
     return SampledRun(
-        time=time, measured=rows[0], position=rows[1], velocity=rows[2], estimate=rows[3], torque=rows[4]
+        time=time,
+        measured=rows[0],
+        position=rows[1],
+        velocity=rows[2],
+        estimate=rows[3],
+        torque=rows[4],
+        end=run.end,
     )
 
 
@@ -166,7 +234,7 @@ def run_many(
     reference: float = 0.0,
     map: Map = map,
 ) -> FloatArray:
-    """Measured positions of many runs, (m, n) [rad], at 0, h, 2 h, ...
+    """Measured positions of many runs, (m, n) [rad], at 0, h, 2 h, ...; NaN from where a run has run away.
 
     Parameters
     ----------
@@ -183,14 +251,15 @@ def run_many(
     for name, values in (("robots", robots), ("controllers", controllers), ("starts", starts)):
         if len(values) not in (1, m):
             raise ModelError(f"{len(values)} {name} for {m} runs: give one for each, or one for all")
-    settings = _settings(sampling, reference)
     rows = [_checked_rows(1, starts[i % len(starts)], duration, sampling, reference) for i in range(m)]
 
     def play(i: int) -> FloatArray:
         start = starts[i % len(starts)]
-        plant = plant_array(robots[i % len(robots)])
-        carried = _controller_array(controllers[i % len(controllers)])
-        _run(plant, carried, settings, (float(start[0]), float(start[1])), rows[i])
+        robot, controller = robots[i % len(robots)], controllers[i % len(controllers)]
+        run = LongRun(robot, controller, sampling, start=start, reference=reference)
+        made = run.fill(rows[i])
+        if run.end == ENDS[_AWAY]:
+            rows[i][0, made:] = math.nan
         return np.asarray(rows[i][0])
 
     return np.array(list(map(play, range(m))))

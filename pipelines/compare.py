@@ -22,6 +22,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -29,10 +30,12 @@ import numpy as np
 from compensation.bifurcation import Diagram, diagram
 from compensation.closed_loop import ClosedLoop
 from compensation.equilibria import equilibrium_set
+from compensation.sampled_loop import Map
 from data.recording import Axis, FloatArray
 from ident.estimate import RunUse
 from ident.model.robot import OneLinkRobot
 from pipelines.onset import (
+    DECIDED,
     Bracket,
     Found,
     JudgedRun,
@@ -44,11 +47,13 @@ from pipelines.onset import (
     scanned_gains,
     smallest_cycling,
 )
-from pipelines.progress import Progress, Silent, Tick
+from pipelines.progress import Progress, Silent
 from pipelines.recordings import SetPointRun
 from pipelines.results.folder import ResultFolder
 from pipelines.results.robot_file import RobotFile
 from pipelines.run_outcomes import (
+    SPENT,
+    Budget,
     LoopAsRun,
     Outcome,
     Verdicts,
@@ -56,13 +61,14 @@ from pipelines.run_outcomes import (
     ideal_outcomes,
     position_error,
     recorded_outcome,
+    sampled_outcomes,
     unpredicted,
 )
 from pipelines.settings.loop import LawChoice
 
 COMPARISON_SCHEMA: Final = "stribeck/comparison/1"
 DRAWS: Final = 40
-DECIDED: Final = ("equilibrium", "limit_cycle")
+ONSET_SAMPLES: Final = 24_000_000  # that the searches for all onsets may run: seconds of computing
 DIAGRAM_POINTS: Final = 101
 PREDICTIONS: Final = ("predicted", "predicted_ideal", "predicted_symmetric")
 
@@ -155,7 +161,7 @@ def compare(
     runs: Sequence[SetPointRun],
     source: RobotFile,
     *,
-    sampled: Verdicts,
+    map: Map = map,
     law: LawChoice = "per-direction",
     compensator: LawChoice | None = None,
     excluded: tuple[RunUse, ...] = (),
@@ -164,24 +170,33 @@ def compare(
 ) -> Comparison:
     """Classify the recorded runs, predict each from its own start, and find the onsets.
 
-    `sampled` predicts loops as they ran (`run_outcomes.sampled_outcomes`, on as many threads as its caller
-    gives it). Raises `RobotFileError` where a parameter of the robot is withheld.
+    `map` spreads the predictions of loops as they ran. What a withheld parameter leaves open has no
+    prediction, and the reason.
     """
     withheld = source.missing()
     judged = tuple(_judged(run, source, law, compensator) for run in runs)
-    predictions = _predictions(judged, sampled) if not withheld else _nothing(judged, "; ".join(withheld))
-    compared = tuple(map(ComparedRun, judged, *predictions))
+    predictions = (
+        _predictions(judged, partial(sampled_outcomes, map=map))
+        if not withheld
+        else _nothing(judged, "; ".join(withheld))
+    )
+    compared = tuple(ComparedRun(*row) for row in zip(judged, *predictions, strict=True))
     generator = np.random.default_rng(seed)
     drawn = () if source.identified is None else source.identified.draws(DRAWS, generator)
     if law == "mean":
         drawn = tuple(robot.mean() for robot in drawn)
     grouped = groups(judged)
     tick = (progress or Silent()).stage("finding onsets", len(grouped))
-    onsets = tuple(_onset(group, drawn, sampled, "; ".join(withheld), tick) for group in grouped)
+    onsets = []
+    for group in grouped:
+        budget = Budget(ONSET_SAMPLES // len(grouped))
+        sampled = partial(sampled_outcomes, map=map, budget=budget)
+        onsets.append(_onset(group, drawn, sampled, budget, "; ".join(withheld)))
+        tick(1)
     return Comparison(
         robot=source.name,
         runs=compared,
-        onsets=onsets,
+        onsets=tuple(onsets),
         excluded=excluded,
         agreement=_agreement(compared),
         diagrams=() if withheld else _diagrams(judged),
@@ -262,13 +277,12 @@ def _onset(
     group: tuple[JudgedRun, ...],
     drawn: Sequence[OneLinkRobot],
     sampled: Verdicts,
+    budget: Budget,
     withheld: str,
-    tick: Tick,
 ) -> Onset:
     loop, recorded = middle(group).loop, recorded_bracket(group)
     if loop is None:
         unknown = Found(None, withheld)
-        tick(1)
         return Onset(group, recorded, unknown, None, withheld, unknown, unknown)
     gains = scanned_gains(group)
     predicted = smallest_cycling(loop, gains, sampled)
@@ -277,11 +291,12 @@ def _onset(
         why = "the robot has no uncertainty to draw from"
     elif predicted.r is not None:
         limits = (float(gains[0]), float(gains[-1]))
-        interval = interval95(drawn_onsets(loop, drawn, sampled, around=predicted.r, limits=limits))
-        why = None if None not in interval else "an end lies beyond the r that were searched"
+        ends = interval95(drawn_onsets(loop, drawn, sampled, around=predicted.r, limits=limits))
+        interval, why = (None, SPENT) if budget.left <= 0 else (ends, None)
+        if interval is not None and None in interval:
+            why = "an end lies beyond the r that were searched"
     ideal = smallest_cycling(loop, gains, ideal_outcomes)
     symmetric = smallest_cycling(_symmetric(loop), gains, ideal_outcomes)
-    tick(1)
     return Onset(group, recorded, predicted, interval, why, ideal, symmetric)
 
 

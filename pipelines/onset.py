@@ -4,9 +4,12 @@ An asymmetric rig is bistable, so an onset belongs to a start. Runs are grouped 
 set and by their start (starts closer to each other than a twentieth of the largest are one start, at their
 median). Recorded, an onset is a bracket: the largest resting r below the smallest cycling r, and that r;
 undecided runs between widen it, and rests above it are listed as reversals. Predicted, it is the smallest r
-whose loop cycles from the group's start, by a scan of r and sections of the interval where it first does.
-The interval of the prediction holds 95 % of the onsets of robots that are drawn from the fit's joint
+whose loop cycles from the group's start, by a scan of r upwards and bisection of the step on which it first
+does. The interval of the prediction holds 95 % of the onsets of robots that are drawn from the fit's joint
 distribution, each found by bisection around the fitted robot's own.
+
+Whether a loop cycles may stay undecided (`pipelines.run_outcomes` bounds how long it is watched). The scan
+then goes on; where nothing cycles, or the step before the first cycle is undecided, the reason says so.
 """
 
 from __future__ import annotations
@@ -26,12 +29,14 @@ from pipelines.run_outcomes import LoopAsRun, Outcome, Verdicts
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
 
+DECIDED: Final = ("equilibrium", "limit_cycle")
 SAME_START: Final = 0.05  # of the largest |x1(0)|
 SCAN_STEP: Final = 0.01  # of r
 BEYOND: Final = 0.2  # of r: how far past the recorded runs a scan goes
 TOLERANCE: Final = 2e-4  # of r
-DRAWN_STEP: Final = 0.02  # of r: first bracket around the fitted robot's onset
-DRAWN_TOLERANCE: Final = 0.003  # of r, small against the spread that it is to show
+BLOCK: Final = 4  # values of a scan that are predicted at a time
+DRAWN_STEP: Final = 0.004  # of r: first bracket around the fitted robot's onset
+DRAWN_TOLERANCE: Final = 0.002  # of r
 
 
 @dataclass(frozen=True)
@@ -120,21 +125,35 @@ def scanned_gains(group: Sequence[JudgedRun]) -> FloatArray:
     return np.unique(np.concatenate((steps[steps >= 0], recorded)))
 
 
-def smallest_cycling(loop: LoopAsRun, gains: FloatArray, predict: Verdicts, *, sections: int = 8) -> Found:
+def smallest_cycling(loop: LoopAsRun, gains: FloatArray, predict: Verdicts) -> Found:
     """The smallest r of the scan that cycles, made precise between it and the one before."""
-    cycling = [outcome.cycles for outcome in predict([loop.at(float(r)) for r in gains])]
-    if not any(cycling):
-        return Found(None, f"no r from {gains[0]:g} to {gains[-1]:g} cycles from this start")
-    first = cycling.index(True)
+    before: list[Outcome] = []
+    while len(before) < gains.size:
+        block = gains[len(before) : len(before) + BLOCK]
+        outcomes = predict([loop.at(float(r)) for r in block])
+        cycling = [outcome.cycles for outcome in outcomes]
+        if any(cycling):
+            before += outcomes[: cycling.index(True)]
+            break
+        before += outcomes
+    first, unknown = len(before), [outcome for outcome in before if outcome.verdict not in DECIDED]
+    if first == gains.size:
+        why = f"no r from {gains[0]:g} to {gains[-1]:g} cycles from this start"
+        return Found(None, why + (f" ({_undecided(unknown)})" if unknown else ""))
     if first == 0:
         return Found(None, f"every r down to {gains[0]:g} cycles from this start")
+    if before[-1].verdict not in DECIDED:
+        return Found(None, f"cycles at r = {gains[first]:g}; below, {_undecided(unknown)}")
     low, high = float(gains[first - 1]), float(gains[first])
     while high - low > TOLERANCE:
-        inner = np.linspace(low, high, sections + 1)[1:-1]
-        states = [outcome.cycles for outcome in predict([loop.at(float(r)) for r in inner])]
-        at = states.index(True) if any(states) else len(states)
-        low, high = (float(inner[at - 1]) if at else low), (float(inner[at]) if at < len(states) else high)
+        centre = 0.5 * (low + high)
+        (outcome,) = predict([loop.at(centre)])
+        low, high = (low, centre) if outcome.cycles else (centre, high)
     return Found(0.5 * (low + high))
+
+
+def _undecided(unknown: Sequence[Outcome]) -> str:
+    return f"{len(unknown)} of the r are undecided: {unknown[-1].why}"
 
 
 def drawn_onsets(

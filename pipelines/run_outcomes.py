@@ -8,7 +8,9 @@ The run starts at rest at its first position, x1(0) = q(0) - q_r, with the obser
 
 A prediction is watched for as long as the run was recorded, at least for ten times the slowest time constant
 of the loop without observer error (but no more than ten records), and longer where that leaves the verdict
-open: near the onset a cycle takes its time.
+open: near the onset a cycle takes its time. It is not watched for ever: a sampled run has a number of samples
+(`compensation.sampled_ends`), a continuous one a number of turns of the loop, and a search for an onset has a
+budget of samples for all its runs. What these leave open is undecided, and says so.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from compensation.closed_loop import ClosedLoop, simulate
 from compensation.controller import Controller, Gains
 from compensation.design_criteria import loop_decay
 from compensation.orbits.steady_state import SteadyState, classify
-from compensation.sampled_loop import Map, Sampling, run_many
+from compensation.sampled_ends import SampledEnd, sampled_end
+from compensation.sampled_loop import Map, Sampling
 from data.recording import FloatArray
 from ident.model.robot import OneLinkRobot
 from pipelines.recordings import SetPointRun
@@ -32,7 +35,8 @@ from pipelines.recordings import SetPointRun
 TIME_CONSTANTS = 10.0  # of the slowest motion that a prediction waits for
 LONGEST = 10.0  # times the record, at most
 WATCHED_AGAIN = (1.0, 4.0, 16.0)  # times the first duration, while the verdict is open
-MOST_ROWS = 10_001  # of a continuous run: its cycles last for seconds, and nothing in it is sampled
+MOST_TURNS = 250.0  # of a continuous run, 2 pi sqrt(J/n1) each
+ROWS = 10_001  # of a continuous run: at least 40 a turn
 
 
 @dataclass(frozen=True)
@@ -85,6 +89,9 @@ class LoopAsRun:
         return min(max(self.duration, needed), LONGEST * self.duration)
 
 
+SPENT = "the samples that this search may take are spent: the loop is slow to decide, or sampled fast"
+
+
 class Verdicts(Protocol):
     """A way to predict: outcomes of many loops, in order."""
 
@@ -133,34 +140,43 @@ def recorded_outcome(run: SetPointRun) -> Outcome:
     return _outcome(classify(time, x1, resolution=run.recording.resolution or 0.0), time, x1)
 
 
-def sampled_outcomes(loops: Sequence[LoopAsRun], *, map: Map = map) -> tuple[Outcome, ...]:
-    """Outcomes in the loop as it ran; loops that share their sampling are run together.
+@dataclass
+class Budget:
+    """Samples that the runs of a search may still take. It counts samples and no seconds: results repeat."""
 
-    What the time of the record leaves undecided is watched for longer.
-    """
-    found: dict[int, Outcome] = {}
-    open_ones = list(range(len(loops)))
-    for factor in WATCHED_AGAIN:
-        batches: dict[tuple[Sampling, float, float], list[int]] = {}
-        for number in open_ones:
-            loop = loops[number]
-            batches.setdefault((loop.sampling, factor * loop.watched, loop.reference), []).append(number)
-        for (sampling, duration, reference), members in batches.items():
-            positions = run_many(
-                [loops[i].robot for i in members],
-                [loops[i].controller for i in members],
-                sampling,
-                starts=[(loops[i].position, 0.0) for i in members],
-                duration=duration,
-                reference=reference,
-                map=map,
-            )
-            time = np.arange(positions.shape[1], dtype=np.float64) * sampling.period
-            for i, position in zip(members, positions, strict=True):
-                x1 = position - reference
-                found[i] = _outcome(classify(time, x1, resolution=sampling.resolution), time, x1)
-        open_ones = [number for number in open_ones if found[number].verdict == "undecided"]
-    return tuple(found[i] for i in range(len(loops)))
+    left: int
+
+    def take(self, samples: int) -> None:
+        """Pay for runs that were made."""
+        self.left -= samples
+
+
+def sampled_outcomes(
+    loops: Sequence[LoopAsRun], *, map: Map = map, budget: Budget | None = None
+) -> tuple[Outcome, ...]:
+    """Outcomes in the loop as it ran; once a `budget` is spent, all that is asked after is undecided."""
+    if budget is not None and budget.left <= 0:
+        return tuple(Outcome("undecided", None, None, None, None, SPENT) for _ in loops)
+    ends = tuple(map(_sampled, loops))
+    if budget is not None:
+        budget.take(sum(end.samples for end in ends))
+    return tuple(
+        Outcome(
+            end.state.verdict, end.x1_min, end.x1_max, end.state.amplitude, end.state.period, end.state.why
+        )
+        for end in ends
+    )
+
+
+def _sampled(loop: LoopAsRun) -> SampledEnd:
+    return sampled_end(
+        loop.robot,
+        loop.controller,
+        loop.sampling,
+        start=loop.position,
+        reference=loop.reference,
+        stretches=[factor * loop.watched for factor in WATCHED_AGAIN],
+    )
 
 
 def ideal_outcomes(loops: Sequence[LoopAsRun]) -> tuple[Outcome, ...]:
@@ -169,20 +185,27 @@ def ideal_outcomes(loops: Sequence[LoopAsRun]) -> tuple[Outcome, ...]:
 
 
 def _ideal(loop: LoopAsRun) -> Outcome:
-    for factor in WATCHED_AGAIN:
-        duration = factor * loop.watched
-        rows = min(math.floor(duration / loop.sampling.period) + 1, MOST_ROWS)
+    turn = 2.0 * math.pi * math.sqrt(loop.robot.inertia / loop.controller.gains.proportional)
+    durations = [min(factor * loop.watched, MOST_TURNS * turn) for factor in WATCHED_AGAIN]
+    for duration in dict.fromkeys(durations):
         trajectory = simulate(
             ClosedLoop(loop.robot, loop.controller),
             (loop.start, 0.0, 0.0),
-            times=np.linspace(0.0, duration, rows),
+            times=np.linspace(0.0, duration, ROWS),
             duration=duration,
         )
+        if trajectory.end_reason == "equilibrium":
+            rest = float(trajectory.end_state[0])
+            why = f"rests for good after {trajectory.end_time:.3g} s"
+            return Outcome("equilibrium", rest, rest, None, None, why)
         x1 = trajectory.state[:, 0]
+        if not np.all(np.isfinite(x1)):
+            why = f"the exact solution stopped after {trajectory.end_time:.4g} s: {trajectory.end_reason}"
+            return Outcome("undecided", None, None, None, None, why)
         found = _outcome(classify(trajectory.time, x1), trajectory.time, x1)
         if found.verdict != "undecided":
-            break
-    return found
+            return found
+    return replace(found, why=f"{found.why}; watched for {durations[-1]:.4g} s and no longer")
 
 
 def _outcome(steady: SteadyState, time: FloatArray, x1: FloatArray) -> Outcome:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -34,7 +33,6 @@ from pipelines.results.folder import ResultFolder
 from pipelines.results.manifest import Command, versions, write_manifest
 from pipelines.results.robot_file import RobotFile, read_robot, withheld_parameters
 from pipelines.robot_questions import axis_of, predict_robot
-from pipelines.run_outcomes import sampled_outcomes
 from pipelines.settings.campaign import Campaign
 from pipelines.settings.gains import GainOptions, chosen_gains, chosen_sampling, with_exact
 from pipelines.settings.loop import LawChoice
@@ -205,7 +203,7 @@ def _answer_for_runs(
         found = compare(
             logs.runs,
             source,
-            sampled=partial(sampled_outcomes, map=spread),
+            map=spread,
             law=options.law,
             compensator=options.compensator,
             excluded=logs.excluded,

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from compensation.controller import Controller, Gains
-from compensation.sampled_loop import Sampling, run_many, run_sampled
+from compensation.sampled_loop import LongRun, Sampling, run_many, run_sampled
 from ident.model.friction import ModelError
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
@@ -118,3 +118,42 @@ def test_refuses_what_no_controller_can_be() -> None:
         run_sampled(TABLE_1, controller(1.0), Sampling(1e-3), start=(math.nan, 0.0), duration=1.0)
     with pytest.raises(ModelError, match="one for each"):
         run_many([TABLE_1], [controller(1.0)] * 2, Sampling(1e-3), starts=[(0.0, 0.0)] * 3, duration=1.0)
+
+
+def test_a_run_goes_on_where_it_ended() -> None:
+    sampling = Sampling(1e-3, resolution=COUNT, delay=2)
+    whole = run_sampled(TABLE_1, controller(1.1), sampling, start=(0.6, 0.0), duration=2.0)
+    run = LongRun(TABLE_1, controller(1.1), sampling, start=(0.6, 0.0))
+    parts = [np.empty((1, n)) for n in (1, 700, 1300)]
+    assert [run.fill(part) for part in parts] == [1, 700, 1300]
+    np.testing.assert_array_equal(np.concatenate([part[0] for part in parts]), whole.measured)
+    assert (run.end, whole.end) == ("time reached", "time reached")
+
+
+@pytest.mark.parametrize("delay", [0, 3])
+def test_a_rest_for_good_is_one(delay: int) -> None:
+    """What is filled up at once is what the samples would have been: no later one differs."""
+    sampling = Sampling(1e-3, resolution=COUNT, delay=delay)
+    run = LongRun(TABLE_1, controller(0.9), sampling, start=(0.6, 0.0))
+    rows = np.empty((5, 30_001))
+    made = run.fill(rows)
+    assert run.end == "at rest for good"
+    assert made < 20_000
+    np.testing.assert_array_equal(rows[:, made:] - rows[:, made - 1 : made], 0.0)
+    assert abs(rows[4, -1]) <= TABLE_1.friction.positive.static_torque
+    measured, estimate, torque = rows[0, -1], rows[3, -1], rows[4, -1]
+    dry = math.copysign(float(SYMMETRIC.friction.positive.dry(abs(estimate))), estimate)
+    assert torque == pytest.approx(-0.4 * measured - 0.02 * estimate + 0.9 * dry, abs=1e-12)
+    with pytest.raises(ModelError, match="does not go on"):
+        run.fill(rows)
+
+
+def test_an_unstable_controller_runs_away_and_is_cut_short() -> None:
+    """Euler's observer diverges from L h = 2 on; without an end its torques keep the solver busy for ever."""
+    fast = Controller(Gains(0.004, 0.02, observer=1000.0, compensation=0.9), SYMMETRIC)
+    run = run_sampled(TABLE_1, fast, Sampling(1e-2), start=(0.6, 0.0), duration=30.0)
+    assert run.end == "runs away"
+    assert run.time.size == run.torque.size < 100
+    assert np.all(np.isfinite(run.torque))
+    (position,) = run_many([TABLE_1], [fast], Sampling(1e-2), starts=[(0.6, 0.0)], duration=30.0)
+    np.testing.assert_array_equal(np.isfinite(position), np.arange(position.size) < run.time.size)

@@ -27,11 +27,19 @@ from pipelines.onset import (
     smallest_cycling,
 )
 from pipelines.recordings import SetPointRun
-from pipelines.run_outcomes import LoopAsRun, Outcome, Verdicts
+from pipelines.run_outcomes import (
+    SPENT,
+    Budget,
+    LoopAsRun,
+    Outcome,
+    Verdicts,
+    ideal_outcomes,
+    sampled_outcomes,
+)
 
 REST = Outcome("equilibrium", 0.1, 0.1, None, None)
 CYCLE = Outcome("limit_cycle", -0.3, 0.3, 0.3, 6.0)
-UNDECIDED = Outcome("undecided", None, None, None, None)
+UNDECIDED = Outcome("undecided", None, None, None, None, "too slow")
 ROBOT = published.symmetric_robot()
 
 
@@ -116,6 +124,42 @@ def test_an_onset_beyond_the_scan_is_none_and_says_so(threshold: float, why: str
     found = smallest_cycling(loop_of(judged(1.0)), gains, cycling_from(threshold))
     assert found.r is None
     assert why in (found.why or "")
+
+
+def test_what_is_undecided_is_no_onset_and_is_said() -> None:
+    def nothing(loops: Sequence[LoopAsRun]) -> tuple[Outcome, ...]:
+        return tuple(UNDECIDED for _ in loops)
+
+    def above(loops: Sequence[LoopAsRun]) -> tuple[Outcome, ...]:
+        return tuple(CYCLE if loop.controller.gains.compensation > 1.0 else UNDECIDED for loop in loops)
+
+    gains = scanned_gains([judged(0.9), judged(1.3)])
+    for predict, why in ((nothing, "no r from 0.7 to 1.5"), (above, "cycles at r = 1.01")):
+        found = smallest_cycling(loop_of(judged(1.0)), gains, predict)
+        assert found.r is None
+        assert why in (found.why or "")
+        assert "of the r are undecided: too slow" in (found.why or "")
+
+
+def test_a_search_ends_when_its_samples_are_spent() -> None:
+    loop, budget = loop_of(judged(1.1)), Budget(30_000)
+    (first,) = sampled_outcomes([loop], budget=budget)
+    assert first.verdict == "limit_cycle"
+    assert budget.left <= 10_000
+    sampled_outcomes([loop], budget=budget)
+    (second,) = sampled_outcomes([loop], budget=budget)
+    assert (second.verdict, second.why) == ("undecided", SPENT)
+
+
+@pytest.mark.parametrize("n1", [0.004, 0.4, 400.0])
+def test_the_ideal_loop_is_watched_in_turns_of_its_own(n1: float) -> None:
+    """A fast loop turns thousands of times in the time of a record: rows and steps must not."""
+    robot = published.asymmetric_robot()
+    for r, verdict in ((0.7, "equilibrium"), (1.3, "limit_cycle")):
+        controller = Controller(Gains(n1, 0.02, 73.5, r), robot.mean())
+        loop = LoopAsRun(robot, controller, Sampling(0.001), 0.6, 0.0, 30.0)
+        (found,) = ideal_outcomes([loop])
+        assert found.verdict == verdict
 
 
 def test_drawn_onsets_are_found_near_and_far_and_not_beyond() -> None:
