@@ -33,6 +33,7 @@ SIGN: Final[Mapping[Direction, int]] = {"positive": 1, "negative": -1}
 
 GRID = 40  # Stribeck velocities tried as starts in each direction
 STARTS = 8  # polished by the full fit
+UNFELT = 1e-3  # of the slowest speed: a Stribeck velocity that no run feels
 FELT = 0.1  # change of the residuals, in standard errors, under a parameter's own size: less is not felt
 SAME = 1.0  # chi-square above the least, below which another minimum is as good
 
@@ -52,6 +53,7 @@ class FitData:
     momenta: tuple[Momentum, ...]
     whitening: tuple[FloatArray, ...]  # (k, k) for each momentum: the inverse square root of its covariance
     inertia: tuple[float, float] | None  # from the frequency response, with its standard error
+    lines: tuple[Direction, ...] = ()  # directions without Stribeck effect: dF raises their breakaways alone
 
     @property
     def has_inertia(self) -> bool:
@@ -143,9 +145,14 @@ _SHAPES: Final = tuple(
 def _polish(data: FitData, start: Mapping[str, float], *, free_beta: bool) -> lmfit.minimizer.MinimizerResult:
     """One least-squares fit from one start."""
     parameters = lmfit.Parameters()
-    for name, value in start.items():
+    straight = {f"{d}_stribeck_{name}" for d in data.lines for name in ("velocity", "shape")}
+    for name, begun in start.items():
         shape = name.endswith("stribeck_shape")
         known = (shape and not free_beta) or (name == "inertia" and not data.has_inertia)
+        known = known or name in straight
+        value = begun
+        if name in straight:
+            value = 1.0 if shape else UNFELT * float(np.min(data.speed))
         parameters.add(
             name, value=value, min=0.05 if shape else 0.0, max=8.0 if shape else np.inf, vary=not known
         )
@@ -153,16 +160,18 @@ def _polish(data: FitData, start: Mapping[str, float], *, free_beta: bool) -> lm
     def objective(current: lmfit.Parameters) -> FloatArray:
         return residuals(data, current.valuesdict())
 
-    return lmfit.minimize(
-        objective,
-        parameters,
-        method="least_squares",
-        scale_covar=False,
-        x_scale="jac",
-        ftol=1e-12,
-        xtol=1e-12,
-        gtol=1e-12,
-    )
+    # lmfit's own covariance, of which only the report makes use, has no roots where a parameter is not felt.
+    with np.errstate(invalid="ignore", over="ignore"):
+        return lmfit.minimize(
+            objective,
+            parameters,
+            method="least_squares",
+            scale_covar=False,
+            x_scale="jac",
+            ftol=1e-12,
+            xtol=1e-12,
+            gtol=1e-12,
+        )
 
 
 def _covariance(data: FitData, values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
@@ -173,11 +182,21 @@ def _covariance(data: FitData, values: Mapping[str, float], free: Sequence[str])
     """
     columns = []
     for name in free:
-        step = 1e-6 * max(abs(values[name]), 1e-6 * max(abs(value) for value in values.values()))
+        step = 1e-6 * max(abs(values[name]), 1e-9 * max(values.values()))
+        if name.endswith("stribeck_velocity"):
+            step = 1e-6 * values[name]
         ahead, behind = (residuals(data, {**values, name: values[name] + off}) for off in (step, -step))
         columns.append((ahead - behind) / (2 * step))
     jacobian = np.column_stack(columns)
-    size = np.array([abs(values[name]) for name in free])
+    # A Stribeck torque that ended at 0 is felt as F_s is, in parts of F_c.
+    size = np.array(
+        [
+            max(abs(values[name]), values.get(name.replace("stribeck", "coulomb"), 0.0))
+            if name.endswith("stribeck_torque")
+            else abs(values[name])
+            for name in free
+        ]
+    )
     norm = np.linalg.norm(jacobian, axis=0)
     felt = (norm * size > FELT) | ((size == 0) & (norm > 0))
     covariance = np.diag(np.where(felt, 0.0, np.inf))

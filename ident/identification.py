@@ -25,6 +25,7 @@ from ident.frequency_response import LEAST_SPEED_RATIO, FrequencyInertia
 from ident.friction_fit import DIRECTIONS, SIGN
 from ident.friction_map import MapPoint
 from ident.parameters import UNITS, Parameters, parameters
+from ident.stribeck_effect import where_it_shows
 from ident.weighting import Weighted, settle, with_inertia
 from ident.withholding import require_enough
 
@@ -52,7 +53,7 @@ def identify(recordings: Sequence[Recording], *, free_beta: bool = False) -> Ide
     axis = _axis(recordings)
     evidence = gather(recordings)
     require_evidence(recordings, evidence)
-    weighted = settle(evidence, free_beta=free_beta)
+    weighted = where_it_shows(evidence, settle(evidence, free_beta=free_beta), free_beta=free_beta)
     per_direction = 5 if free_beta else 4
     for direction in DIRECTIONS:
         require_enough(weighted.data, direction, parameters=per_direction)

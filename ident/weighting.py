@@ -64,7 +64,7 @@ def settle(evidence: Evidence, *, free_beta: bool) -> Weighted:
     fit = replace(fit, values={**fit.values, "inertia": _balanced_inertia(evidence.momenta, fit, spread)})
     data = first
     for number in range(MOST_ROUNDS):
-        data = _reweighted(evidence, data, fit, spread)
+        data = reweighted(evidence, data, fit, spread)
         again = fit_friction(data, free_beta=free_beta, start=fit)
         change = _change(fit, again)
         fit = again
@@ -88,7 +88,7 @@ def with_inertia(
     fit = replace(weighted.fit, values={**weighted.fit.values, "inertia": inertia[0]})
     fit = fit_friction(data, free_beta=free_beta, start=fit)
     for _ in range(2):
-        data = _reweighted(evidence, data, fit, weighted.spread)
+        data = reweighted(evidence, data, fit, weighted.spread)
         fit = fit_friction(data, free_beta=free_beta, start=fit)
     return Weighted(data, replace(fit, other_minimum=weighted.fit.other_minimum), weighted.spread)
 
@@ -105,7 +105,7 @@ def _settle_steady(evidence: Evidence, first: FitData, *, inertia: float | None,
     for number in range(ROUNDS):
         seen = replace(fit, values={**fit.values, "inertia": inertia or 0.0})
         spread = _spread_of(evidence, data, seen)
-        data = _reweighted(evidence, data, seen, spread)
+        data = reweighted(evidence, data, seen, spread)
         fit = fit_friction(data, free_beta=free_beta, start=None if number == ROUNDS - 1 else fit)
     return Weighted(data, fit, spread)
 
@@ -118,14 +118,14 @@ def _known_inertia(evidence: Evidence, data: FitData) -> float | None:
 def _balanced_inertia(momenta: Sequence[Momentum], fit: FrictionFit, spread: RunSpread) -> float:
     """The J that balances the motion under the law of the steady runs, by weighted least squares."""
     inertia = fit.values["inertia"]
-    left, right = 0.0, 0.0
+    left = right = 0.0
     for motion in momenta:
         law = fit.law("positive" if motion.direction > 0 else "negative")
         whitening = _whitening(motion, inertia, spread, scale=1.0)
         gain = whitening @ motion.gain
         left += float(gain @ (whitening @ motion.residual(0.0, law)))
         right += float(gain @ gain)
-    return left / right if left > 0 else inertia
+    return float(left / right) if left > 0 else inertia
 
 
 def _change(fit: FrictionFit, again: FrictionFit) -> float:
@@ -134,12 +134,13 @@ def _change(fit: FrictionFit, again: FrictionFit) -> float:
     return float(np.max(np.abs(change) / np.sqrt(np.diag(again.covariance))))
 
 
-def fitted_robot(fit: FrictionFit) -> OneLinkRobot | None:
-    """The robot of a fit, where its values are a robot's."""
+def fitted_robot(fit: FrictionFit, lines: Sequence[Direction] = ()) -> OneLinkRobot | None:
+    """The robot of a fit, where its values are a robot's; without Stribeck effect where its law is a line."""
     curves = {}
     try:
         for direction in DIRECTIONS:
             coulomb, stribeck, velocity, damping, shape = fit.law(direction)
+            stribeck = 0.0 if direction in lines else stribeck
             curves[direction] = StribeckCurve(coulomb + stribeck, coulomb, velocity, damping, shape)
         return OneLinkRobot(fit.values["inertia"], StribeckFriction(**curves))
     except ModelError:
@@ -181,13 +182,15 @@ def _spread_of(evidence: Evidence, data: FitData, fit: FrictionFit) -> RunSpread
 def _own_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatArray:
     """What a run's own noise and the error of its speed make of its torque's variance (n,) [(N m)^2]."""
     runs = evidence.used_runs
-    return white_variance(runs) + (_slopes(data, fit) * np.array([run.velocity_stderr for run in runs])) ** 2
+    speed = np.array([run.velocity_stderr for run in runs])
+    return np.asarray(white_variance(runs) + (_slopes(data, fit) * speed) ** 2)
 
 
-def _reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: RunSpread) -> FitData:
+def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: RunSpread) -> FitData:
+    """The data with onsets and standard errors as a fit and the spread between runs make them."""
     runs, starts = evidence.used_runs, evidence.used_starts
     travel = np.array([run.travel for run in runs])
-    start_torque, delay_error = _onset_torque(starts, fit)
+    start_torque, delay_error = _onset_torque(starts, fit, data.lines)
     line = np.hypot(np.array([start.line.stderr for start in starts]), delay_error)
     place = _place_spread(data, fit, start_torque, line, spread)
     scale = _motion_scale(data.momenta, fit, spread)
@@ -223,9 +226,11 @@ def _slopes(data: FitData, fit: FrictionFit) -> FloatArray:
     return slope
 
 
-def _onset_torque(starts: Sequence[Breakaway], fit: FrictionFit) -> tuple[FloatArray, FloatArray]:
+def _onset_torque(
+    starts: Sequence[Breakaway], fit: FrictionFit, lines: Sequence[Direction]
+) -> tuple[FloatArray, FloatArray]:
     """Torque at the onset (m,) [N m], magnitudes, and the error that the delay may bring (m,)."""
-    robot = fitted_robot(fit)
+    robot = fitted_robot(fit, lines)
     torque, error = np.zeros(len(starts)), np.zeros(len(starts))
     for number, start in enumerate(starts):
         rate, torque[number] = abs(start.line.rate), abs(start.torque)

@@ -23,6 +23,9 @@ AT_BOUND = 1e-3  # part of the parameter's own error
 SPARE = 3  # least number of data beyond the free parameters
 
 
+_LINE = "; F_c and b are those of a line, F_s that of the breakaways"
+
+
 @dataclass(frozen=True)
 class Withheld:
     """Reasons by parameter of CURVE_PARAMETERS, and the findings that say so."""
@@ -67,16 +70,16 @@ def withheld(
         codes.setdefault(code, text)
 
     least = interval["stribeck_torque"].low
-    if least is None or least <= 0.0 or stribeck <= 0.0:
+    line = direction in data.lines
+    if line or least is None or least <= 0.0 or stribeck <= 0.0:
         withhold(
             "E-NOSTRIBECK",
             ("stribeck_velocity", "stribeck_shape"),
             f"{direction} direction: F_s - F_c = {stribeck:.3g} with an interval that holds 0: no Stribeck "
-            "effect is "
-            f"seen, so its velocity has no meaning. Record speeds below {0.2 * float(speeds.min()):.2g} and "
-            "breakaways if one is expected.",
+            f"effect is seen, so its velocity has no meaning{_LINE if line else ''}. "
+            f"Record speeds below {0.2 * float(speeds.min()):.2g} and breakaways if one is expected.",
         )
-    sparse = low < LEAST_SPEEDS or high < LEAST_SPEEDS
+    sparse = not line and (low < LEAST_SPEEDS or high < LEAST_SPEEDS)
     if sparse and _loose(velocity, interval["stribeck_velocity"]):
         where = f"under {velocity:.3g}" if low < LEAST_SPEEDS else f"over {3 * velocity:.3g}"
         text = (

@@ -281,3 +281,18 @@ def test_an_unknown_inertia_is_not_taken_for_one() -> None:
     assert found.robot.inertia.value is None
     for parameter, estimate, truth in _estimates(found, rig)[1:]:
         assert estimate.value == pytest.approx(truth, rel=2 * TOLERANCE[parameter]), parameter
+
+
+def test_without_a_stribeck_effect_a_line_is_fitted_and_v_s_withheld() -> None:
+    curve = StribeckCurve(0.4, 0.4, 0.05, 0.1)
+    robot = OneLinkRobot(0.026, StribeckFriction(curve, StribeckCurve(0.36, 0.36, 0.05, 0.09)))
+    rig, generator = Rig(robot=robot, torque_noise=0.004), np.random.default_rng(25)
+    found = identify([*_speeds(rig, generator), *_ramps(rig, generator)]).robot
+    for direction, truth in (("positive", robot.friction.positive), ("negative", robot.friction.negative)):
+        estimates = getattr(found, direction)
+        assert str(estimates["stribeck_velocity"].withheld).startswith("E-NOSTRIBECK")
+        for name in ("static_torque", "coulomb_torque", "viscous_damping"):
+            estimate = estimates[name]
+            assert estimate.value == pytest.approx(getattr(truth, name), rel=0.01), name
+            assert abs(estimate.value - getattr(truth, name)) < 4 * estimate.stderr, name
+    assert not {"E-LOWSPEED", "E-BOUND", "E-LOCAL"} & {note.code for note in found.notes}

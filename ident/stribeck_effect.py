@@ -1,0 +1,62 @@
+"""Whether the data show a Stribeck effect at all; where they do not, the law is a line.
+
+Without an effect v_s has no meaning, and a fit that keeps it wanders off: to a v_s so long that the fading
+torque imitates damping, or so short that it touches nothing. A direction is therefore held against a line
+F_c + b v with a breakaway torque of its own. The line stays where two things are so:
+
+- the curve fits no better: chi-square falls by less than 6 (v_s vanishes from the model at dF = 0, so that
+  the threshold is not the 3.84 of one more parameter: the best of all v_s is compared);
+- the breakaways lie no higher than the line by more than their errors.
+
+The second is judged with the onset of a link without Stribeck effect, which starts more slowly: with the
+wrong delay a fast ramp alone would look like an effect.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ident.confidence import quantile
+from ident.evidence import Evidence
+from ident.friction_fit import DIRECTIONS, Direction, fit_friction
+from ident.weighting import Weighted, reweighted
+
+EARNED = 6.0  # fall of chi-square by which a curve has to beat the line
+CLEAR = 8.0  # standard errors of dF and of v_s from zero: nothing to ask then
+
+
+def where_it_shows(evidence: Evidence, weighted: Weighted, *, free_beta: bool) -> Weighted:
+    """The fit as it is, or with a line in each direction without a Stribeck effect."""
+    for direction in DIRECTIONS:
+        if not _is_clear(weighted, direction):
+            weighted = _line_if_as_good(evidence, weighted, direction, free_beta=free_beta)
+    return weighted
+
+
+def _is_clear(weighted: Weighted, direction: Direction) -> bool:
+    fit = weighted.fit
+    for name in (f"{direction}_stribeck_torque", f"{direction}_stribeck_velocity"):
+        where = fit.free.index(name)
+        if not fit.values[name] ** 2 > CLEAR**2 * float(fit.covariance[where, where]):
+            return False
+    return True
+
+
+def _line_if_as_good(
+    evidence: Evidence, weighted: Weighted, direction: Direction, *, free_beta: bool
+) -> Weighted:
+    lines = (*weighted.data.lines, direction)
+    data = replace(weighted.data, lines=lines)
+    fit = fit_friction(data, free_beta=free_beta, start=weighted.fit)
+    if fit.chi_square - weighted.fit.chi_square > EARNED:
+        return weighted
+    for _ in range(2):
+        data = reweighted(evidence, data, fit, weighted.spread)
+        fit = fit_friction(data, free_beta=free_beta, start=fit)
+    where = fit.free.index(f"{direction}_stribeck_torque")
+    error = float(np.sqrt(fit.covariance[where, where]))
+    dof = data.torque.size + data.start_torque.size - len(fit.free)
+    seen = np.isfinite(error) and fit.values[f"{direction}_stribeck_torque"] > quantile(dof) * error
+    return weighted if seen else Weighted(data, fit, weighted.spread)
