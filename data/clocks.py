@@ -33,9 +33,12 @@ class ClockReport:
         return 1.0 / self.period if self.period > 0.0 else 0.0
 
 
-def clock_report(seconds: FloatArray, *, start: float = 0.0) -> ClockReport:
-    """Describe stamps (n,) [s] counted from `start` [s], in the order of the file."""
-    step = np.diff(seconds)
+def clock_report(seconds: FloatArray, *, start: float = 0.0, steps: FloatArray | None = None) -> ClockReport:
+    """Describe stamps (n,) [s] counted from `start` [s], in the order of the file.
+
+    `steps` (n - 1,) [s] between them, where they are known more exactly than the stamps tell.
+    """
+    step = np.diff(seconds) if steps is None else steps
     if not step.size:
         return ClockReport(int(seconds.size), start, 0.0, 0.0, 0.0, 0, (), 0, None)
     median = float(np.median(step))
@@ -59,5 +62,4 @@ def clock_report(seconds: FloatArray, *, start: float = 0.0) -> ClockReport:
 def clock_report_ns(stamps: NDArray[np.int64]) -> ClockReport:
     """Describe stamps (n,) [ns]; differences are taken before they become floats."""
     first = int(stamps[0]) if stamps.size else 0
-    seconds = ((stamps - first) * 1e-9).astype(np.float64)
-    return clock_report(seconds, start=first * 1e-9)
+    return clock_report((stamps - first) / 1e9, start=first * 1e-9, steps=np.diff(stamps) / 1e9)

@@ -20,10 +20,10 @@ from numpy.typing import NDArray
 from data.alignment import align
 from data.csv.description import TIME_NAMES
 from data.csv.dialect import bare, sniff
-from data.csv.log import find_column, read_csv
+from data.csv.log import elapsed, find_column, read_csv, table_integrity
+from data.elapsed import since_first, unset_lead
 from data.findings import Finding, LogError, Severity
-from data.integrity import Integrity
-from data.mcap.columns import McapColumns, Topic, read_columns
+from data.mcap.columns import McapColumns, Topic, read_columns, survey
 from data.mcap.field_path import FieldPath, parse_path
 from data.mcap.records import ByteArray
 from data.names import shown
@@ -214,16 +214,36 @@ def _read_csv(door: _Door, content: ByteArray) -> _Logged:
         text = str(error)
         raise LogError(text if text.startswith(door.log) else f"{door.log}: {text}") from error
     values = {quantity: table.values[column] for quantity, column in columns.items()}
-    seconds = door.convert("time", time, values.pop("time"))
-    integrity = Integrity("absent", losses=(table.loss,) if table.loss else (), messages=seconds.size)
+    integrity = table_integrity(table, rows=values["time"].size)
+    findings = integrity.require(door.log, salvage=door.salvage)
     name = layout.headers[columns["time"]] if layout.headers else str(columns["time"])
+    clock = f"column {shown(name)!r}"
+    lead = unset_lead(door.convert("time", _interval(time), values.pop("time")))
     return _Logged(
-        time=seconds - seconds[0] if seconds.size else seconds,
-        signals={quantity: door.convert(quantity, wanted[quantity], values[quantity]) for quantity in wanted},
-        clock=f"column {shown(name)!r}",
+        time=door.convert("time", _interval(time), elapsed(table, columns["time"], begin=lead)),
+        signals={
+            quantity: door.convert(quantity, wanted[quantity], values[quantity][lead:]) for quantity in wanted
+        },
+        clock=clock,
         metadata=layout.metadata,
-        findings=integrity.require(door.log, salvage=door.salvage),
+        findings=(*findings, *_unset(door, lead, clock)),
     )
+
+
+def _interval(time: Signal) -> Signal:
+    """How differences of a time convert: an offset of the clock is none of theirs."""
+    return replace(time, offset=0.0)
+
+
+def _unset(door: _Door, lead: int, clock: str) -> tuple[Finding, ...]:
+    """What is said of samples at the start whose stamp is 0."""
+    if not lead:
+        return ()
+    text = (
+        f"{lead} sample(s) at the start carry time 0 on the clock ({clock}), the others a date: latched "
+        "before it ran, so that their instant is not known; they are left out"
+    )
+    return (Finding("E-CLOCK", Severity.WARN, text, door.log),)
 
 
 def _plain_time(headers: tuple[str, ...], units: tuple[str | None, ...]) -> Signal:
@@ -261,12 +281,17 @@ def _read_mcap(door: _Door, content: ByteArray) -> _Logged:
     try:
         for quantity, signal in named.items():
             paths[quantity] = parse_path(str(signal.source))
-        read = read_columns(content, list(dict.fromkeys(paths.values())))
     except LogError as error:
         raise LogError(f"{door.log}: {error}") from error
+    try:
+        read = read_columns(content, list(dict.fromkeys(paths.values())), clock=paths.get("time"))
+    except LogError as error:  # damage goes first: what is missing may be what is lost
+        damage = survey(content).require(door.log, salvage=door.salvage)
+        raise LogError("; ".join((f"{door.log}: {error}", *(finding.text for finding in damage)))) from error
     damage = read.integrity.require(door.log, salvage=door.salvage)
     topic = read.topics[paths["position"].topic]
     clock, name, noted = _clock(door, topic)
+    lead = unset_lead(clock / 1e9)
     signals: dict[Quantity, FloatArray] = {}
     findings = [*damage, *noted]
     for quantity, signal in wanted.items():
@@ -274,13 +299,16 @@ def _read_mcap(door: _Door, content: ByteArray) -> _Logged:
         if held is not None:
             findings.append(Finding("E-CLOCK", Severity.WARN, f"{quantity} {held}", door.log))
         signals[quantity] = door.convert(quantity, signal, values)
-    seconds = (clock - clock[0]) * 1e-9
+    seconds = (clock[lead:] - clock[lead]) / 1e9
     if "time" in named:
         path = paths["time"]
         if path.topic != paths["position"].topic:
             raise LogError(f"{door.log}: time must be a field of the position's topic, not of {path.topic!r}")
-        values = door.convert("time", named["time"], topic.values[path.text])
-        seconds, name = values - values[0], f"field {path.text}"
+        time, name = _interval(named["time"]), f"field {path.text}"
+        lead = unset_lead(door.convert("time", time, topic.values[path.text]))
+        seconds = door.convert("time", time, since_first(topic.ticks[lead:]))
+    findings += _unset(door, lead, name)
+    signals = {quantity: values[lead:] for quantity, values in signals.items()}
     logged = _Logged(seconds, signals, name, read.metadata, tuple(findings))
     return _after_first(logged)
 
@@ -315,7 +343,10 @@ def _on_clock(
     if path.topic == master.topic:
         return values, None
     stamp = {"log times": topic.log_time, "publish times": topic.publish_time}.get(name, topic.header_time)
-    aligned = align(clock, topic.log_time if stamp is None else stamp, values)
+    stamp = topic.log_time if stamp is None else stamp
+    begin = clock[unset_lead(clock / 1e9)]
+    latched = np.arange(stamp.size) < unset_lead(stamp / 1e9)  # it holds from before the run began
+    aligned = align(clock, np.where(latched, begin, stamp), values)
     period = float(np.median(np.diff(clock))) * 1e-9 if clock.size > 1 else 0.0
     if aligned.together or aligned.longest_hold <= 3.0 * period:
         return aligned.values, None

@@ -4,7 +4,7 @@ Each detector here sees one run in SI and answers with findings, with mended sig
 (`LogError`) that names the sample, the time, the parameter harmed and the remedy. Nothing that could be good
 data is altered: only a wrap whose other side fits, and single samples that leave the path and come back.
 
-    E-CLOCK  time does not advance                    refused
+    E-CLOCK  time does not advance, or leaps years     refused
     E-WRAP   the encoder wraps                        unwrapped where unambiguous, else refused
     E-SPIKE  single wrong positions                   dropped and counted; refused above 1 %
     E-GAP    lost samples, jitter                     warned; no derivative is taken across a gap
@@ -29,6 +29,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 FEWEST_SAMPLES: Final = 10
 GAP: Final = 3.0  # median steps
+_YEARS: Final = 1e8  # [s] between two samples of no run
 _SPIKE_WINDOW: Final = 25  # samples on either side for the local spread
 _LOOKS_LIKE: Final = (
     (180.0 / math.pi, "the velocity looks like deg/s", "deg/s"),
@@ -138,9 +139,11 @@ def require_samples(run: Signals) -> None:
 
 
 def require_advancing(run: Signals, clock: str) -> None:
-    """E-CLOCK: refuse a clock that stands still or jumps back."""
-    bad = np.flatnonzero(np.diff(run.time) <= 0.0)
+    """E-CLOCK: refuse a clock that stands still, jumps back, or jumps ahead by years."""
+    step = np.diff(run.time)
+    bad = np.flatnonzero(step <= 0.0)
     if not bad.size:
+        _require_one_epoch(run, step, clock)
         return
     k = int(bad[0])
     back = run.time[k] - run.time[k + 1]
@@ -150,6 +153,18 @@ def require_advancing(run: Signals, clock: str) -> None:
         + (f", and at {bad.size - 1} more places" if bad.size > 1 else "")
         + "; every speed there, and so the friction map, would be wrong. Choose another `clock` or time "
         "signal, or keep one side with `window`"
+    )
+
+
+def _require_one_epoch(run: Signals, step: FloatArray, clock: str) -> None:
+    k = int(np.argmax(step))
+    if step[k] < _YEARS:
+        return
+    raise LogError(
+        f"{run.log}: E-CLOCK refuse: the clock ({clock}) jumps ahead by {step[k]:.6g} s, over three years, "
+        f"at sample {k + 1}, t = {run.time[k]:.6g} s: some of its stamps were never set, or count from "
+        "another date; the motion across it cannot be told. Choose another `clock` or time signal, or keep "
+        "one side with `window`"
     )
 
 

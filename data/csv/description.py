@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from data.clocks import ClockReport, clock_report
 from data.csv.dialect import CsvLayout, bare, sniff
-from data.csv.log import read_csv
+from data.csv.log import CsvTable, elapsed, read_csv, table_integrity
 from data.findings import LogError
 from data.integrity import Integrity, Loss
 from data.units import known_unit
@@ -53,10 +53,11 @@ def describe(content: bytes) -> CsvDescription:
         When it is no text, or holds no numbers. Rows that do not fit the others are a loss, not an error.
     """
     layout = sniff(content)
-    values, reasons, loss = _columns(content, layout)
+    tables, reasons = _tables(content, layout)
+    values = {k: table.values[k] for k, table in tables.items()}
     rows = max((array.size for array in values.values()), default=0)
     columns = tuple(_column(k, layout, values.get(k), reasons.get(k)) for k in range(layout.columns))
-    clock, clock_column = _clock(layout, values)
+    clock, clock_column = _clock(layout, tables)
     return CsvDescription(
         layout=layout,
         rows=rows,
@@ -64,32 +65,36 @@ def describe(content: bytes) -> CsvDescription:
         clock=clock,
         clock_column=clock_column,
         metadata=layout.metadata,
-        integrity=Integrity("absent", losses=(loss,) if loss else (), messages=rows),
+        integrity=_integrity(content, tables, reasons, rows=rows),
     )
 
 
-def _columns(
-    content: bytes, layout: CsvLayout
-) -> tuple[dict[int, NDArray[np.float64]], dict[int, str], Loss | None]:
-    """The columns of numbers, why the others are none, and what is lost."""
+def _integrity(
+    content: bytes, tables: Mapping[int, CsvTable], reasons: Mapping[int, str], *, rows: int
+) -> Integrity:
+    """What is lost of the file; all of it when no column can be read."""
+    for table in tables.values():
+        return table_integrity(table, rows=rows)
+    why = next(iter(reasons.values()), "no column of numbers")
+    return Integrity("absent", losses=(Loss(0, len(content), why),), counted="rows")
+
+
+def _tables(content: bytes, layout: CsvLayout) -> tuple[dict[int, CsvTable], dict[int, str]]:
+    """The tables that hold the columns of numbers, and why the other columns are none."""
     everything = range(layout.columns)
     try:
         table = read_csv(content, layout, everything)
-    except LogError as error:
-        problem = str(error)
+    except LogError:
+        tables: dict[int, CsvTable] = {}
+        reasons: dict[int, str] = {}
     else:
-        return table.values, {}, table.loss
-    values: dict[int, NDArray[np.float64]] = {}
-    reasons: dict[int, str] = {}
-    loss: Loss | None = None
+        return dict.fromkeys(everything, table), {}
     for k in everything:
         try:
-            part = read_csv(content, layout, [k])
+            tables[k] = read_csv(content, layout, [k])
         except LogError as error:
             reasons[k] = str(error)
-        else:
-            values[k], loss = part.values[k], part.loss
-    return values, reasons, loss if values else Loss(0, len(content), problem)
+    return tables, reasons
 
 
 def _column(k: int, layout: CsvLayout, values: NDArray[np.float64] | None, why: str | None) -> Column:
@@ -107,14 +112,14 @@ def _column(k: int, layout: CsvLayout, values: NDArray[np.float64] | None, why: 
     )
 
 
-def _clock(
-    layout: CsvLayout, values: Mapping[int, NDArray[np.float64]]
-) -> tuple[ClockReport | None, str | None]:
+def _clock(layout: CsvLayout, tables: Mapping[int, CsvTable]) -> tuple[ClockReport | None, str | None]:
     for k, header in enumerate(layout.headers):
-        if bare(header).lower() in TIME_NAMES and k in values:
+        if bare(header).lower() in TIME_NAMES and k in tables:
             unit = known_unit(layout.units[k] or "s")
-            seconds = values[k] * (unit.factor if unit and unit.kind == "time" else 1.0)
-            finite = seconds[np.isfinite(seconds)]
-            first = float(finite[0]) if finite.size else 0.0
-            return clock_report(finite - first, start=first), header
+            factor = unit.factor if unit and unit.kind == "time" else 1.0
+            stamps = tables[k].values[k] * factor
+            seconds = elapsed(tables[k], k) * factor
+            known = np.isfinite(stamps)
+            first = float(stamps[known][0]) if known.any() else 0.0
+            return clock_report(seconds[known], start=first), header
     return None, None

@@ -90,7 +90,7 @@ def sniff(content: bytes, frozen: CsvDialect | None = None) -> CsvLayout:
         (
             k
             for k, row in enumerate(rows)
-            if len(row) == columns and not _is_comment(lines[k]) and _numeric(row, decimal) >= 0.5
+            if len(row) == columns and not _is_comment(lines[k]) and numeric_share(row, decimal) >= 0.5
         ),
         None,
     )
@@ -182,17 +182,18 @@ def _shape(lines: Sequence[str], frozen: CsvDialect) -> tuple[str, Decimal, int]
     sample = plain[-_SAMPLE:] if len(plain) > _SAMPLE else plain
     best: tuple[float, float, int] = (0.0, 0.0, 0)
     chosen: tuple[str, Decimal, int] | None = None
+    quoted = any('"' in line for line in sample)  # which tells a decimal comma from one between cells
     decimals: tuple[Decimal, ...] = (frozen.decimal,) if frozen.decimal else (".", ",")
     for delimiter in (frozen.delimiter,) if frozen.delimiter else _DELIMITERS:
         for decimal in decimals:
-            if decimal == delimiter:
+            if decimal == delimiter and not quoted:
                 continue
             rows = [split(line, delimiter) for line in sample]
-            numeric = [row for row in rows if _numeric(row, decimal) >= 0.5]
+            numeric = [row for row in rows if numeric_share(row, decimal) >= 0.5]
             if not numeric:
                 continue
             columns, alike = Counter(len(row) for row in numeric).most_common(1)[0]
-            cells = sum(_numeric(row, decimal) for row in numeric) / len(numeric)
+            cells = sum(numeric_share(row, decimal) for row in numeric) / len(numeric)
             score = (
                 round(alike / len(sample) * cells, 2) if columns > 1 else 0.01,
                 float(decimal == "."),
@@ -205,7 +206,7 @@ def _shape(lines: Sequence[str], frozen: CsvDialect) -> tuple[str, Decimal, int]
     return chosen
 
 
-def _numeric(row: Sequence[str], decimal: Decimal) -> float:
+def numeric_share(row: Sequence[str], decimal: Decimal) -> float:
     """The share of a row's filled cells that are numbers; 0 for a row without any."""
     filled = [cell for cell in row if cell]
     if not filled:

@@ -19,10 +19,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from data.csv.dialect import CsvLayout, bare, split
+from data.csv.dialect import CsvLayout, bare
+from data.csv.rows import Rows, whole_rows
+from data.elapsed import FINE, since_first_written
 from data.files import write_atomically
 from data.findings import LogError
-from data.integrity import Loss
+from data.integrity import Integrity
 from data.names import nearest, shown
 
 FloatArray = NDArray[np.float64]
@@ -72,24 +74,65 @@ class CsvTable:
 
     layout: CsvLayout
     values: dict[int, FloatArray]  # by column number; (n,) each
-    loss: Loss | None  # a last line that was cut off
+    rows: Rows  # that they were read from, and what was taken out
 
 
 def read_csv(content: bytes, layout: CsvLayout, wanted: Collection[int]) -> CsvTable:
-    """Read columns, by number from 0.
+    """Read columns, by number from 0. Damaged rows are no error here: see `CsvTable.rows`.
 
     Raises
     ------
     LogError
-        When a row has too many cells, or a wanted cell is no number.
+        When the file is no table, or a wanted cell is no number.
     """
-    text, loss = _without_cut_line(content, layout)
-    _require_even(text, layout)
+    rows = whole_rows(content, layout)
     columns = sorted(set(wanted))
-    options: dict[str, Any] = {
+    options = _options(rows, layout, columns)
+    try:
+        table = pd.read_csv(BytesIO(rows.text), dtype=np.float64, **options)
+    except pd.errors.ParserError as error:
+        raise LogError(f"a row does not have {layout.columns} cells ({shown(str(error).strip())})") from error
+    except (ValueError, OverflowError) as error:
+        raise LogError(_not_a_number(rows.text, layout, columns, options) or shown(str(error))) from error
+    return CsvTable(
+        layout=layout,
+        values={k: np.ascontiguousarray(table[k].to_numpy(np.float64)) for k in columns},
+        rows=rows,
+    )
+
+
+def table_integrity(table: CsvTable, *, rows: int) -> Integrity:
+    """What can be said of a table of so many rows; no table proves its content."""
+    found = table.rows
+    return Integrity("absent", losses=found.losses, messages=rows, notes=found.notes, counted="rows")
+
+
+def elapsed(table: CsvTable, column: int, *, begin: int = 0) -> FloatArray:
+    """A column (n,) [as logged] from row `begin` on, minus its first number there, exact to the text.
+
+    A stamp since 1970 as a float is good to 0.2 us at best. Where that is too coarse for the steps between
+    rows, the difference is taken between the numbers as they are written.
+    """
+    values: FloatArray = table.values[column][begin:]
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return values
+    step = float(np.median(np.abs(np.diff(finite)))) if finite.size > 1 else 0.0
+    if np.spacing(np.abs(finite).max()) <= FINE * step:
+        fine: FloatArray = values - finite[0]
+        return fine
+    options = _options(table.rows, table.layout, [column])
+    text = BytesIO(table.rows.text)
+    cells = pd.read_csv(text, dtype=str, keep_default_na=False, **options)[column]
+    return since_first_written(cells.tolist()[begin:], table.layout.decimal)
+
+
+def _options(rows: Rows, layout: CsvLayout, columns: list[int]) -> dict[str, Any]:
+    """How pandas is to read some columns of the rows."""
+    return {
         "sep": r"\s+" if layout.delimiter == "whitespace" else layout.delimiter,
         "decimal": layout.decimal,
-        "encoding": layout.encoding,
+        "encoding": rows.encoding,
         "comment": layout.comment,
         "header": None,
         "names": list(range(layout.columns)),
@@ -100,17 +143,6 @@ def read_csv(content: bytes, layout: CsvLayout, wanted: Collection[int]) -> CsvT
         "engine": "c",
         **_EXACT,
     }
-    try:
-        table = pd.read_csv(BytesIO(text), dtype=np.float64, **options)
-    except pd.errors.ParserError as error:
-        raise LogError(f"a row does not have {layout.columns} cells ({shown(str(error).strip())})") from error
-    except (ValueError, OverflowError) as error:
-        raise LogError(_not_a_number(text, layout, columns, options) or shown(str(error))) from error
-    return CsvTable(
-        layout=layout,
-        values={k: np.ascontiguousarray(table[k].to_numpy(np.float64)) for k in columns},
-        loss=loss,
-    )
 
 
 def find_column(layout: CsvLayout, source: str | int) -> int:
@@ -143,37 +175,6 @@ def find_column(layout: CsvLayout, source: str | int) -> int:
     if not 0 <= number < layout.columns:
         raise LogError(f"no column number {number}; the log has {layout.columns}, counted from 0")
     return number
-
-
-def _without_cut_line(content: bytes, layout: CsvLayout) -> tuple[bytes, Loss | None]:
-    """The file without a last line that stops short of its cells, as a rig that lost power leaves it."""
-    if layout.encoding.startswith("utf-16") or content.endswith((b"\n", b"\r")):
-        return content, None
-    begin = max(content.rfind(b"\n"), content.rfind(b"\r")) + 1
-    last = content[begin:].decode(layout.encoding, errors="replace")
-    if not last.strip() or len(split(last, layout.delimiter)) >= layout.columns:
-        return content, None
-    return content[:begin], Loss(begin, len(content), "the last line is cut off")
-
-
-def _require_even(text: bytes, layout: CsvLayout) -> None:
-    """Refuse rows with too few or too many cells: a lost cell would shift every number behind it."""
-    if layout.delimiter == "whitespace":
-        return
-    sign = layout.delimiter.encode(layout.encoding.replace("utf-16", "utf-16-le").replace("-le-le", "-le"))
-    body = text.split(b"\n", layout.first_row)[-1] if layout.first_row else text
-    rows = body.count(b"\n") + (not body.endswith(b"\n") and bool(body))
-    if body.count(sign) == rows * (layout.columns - 1):
-        return
-    for number, line in enumerate(text.decode(layout.encoding, errors="replace").splitlines()):
-        if number < layout.first_row or not line.strip() or line.lstrip().startswith(layout.comment or "\0"):
-            continue
-        cells = len(split(line, layout.delimiter))
-        if cells != layout.columns:
-            raise LogError(
-                f"line {number + 1} has {cells} cells, the others {layout.columns}; a lost cell would shift "
-                "the numbers behind it into other columns. Mend or delete the line"
-            )
 
 
 def _not_a_number(text: bytes, layout: CsvLayout, columns: list[int], options: dict[str, Any]) -> str:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from decimal import Decimal
 from itertools import pairwise
 
 import numpy as np
@@ -22,7 +23,7 @@ from data.findings import LogError
 from data.integrity import Integrity
 from data.mcap import joint_state
 from data.mcap.decoding import Decode, decoder
-from data.mcap.field_path import FieldPath, resolve
+from data.mcap.field_path import FieldPath, Number, resolve, resolve_exactly
 from data.mcap.records import ByteArray, gather
 from data.mcap.walk import Block, McapWalk
 from data.names import nearest, shown
@@ -41,6 +42,7 @@ class Topic:
     log_time: TimeArray  # [ns]
     publish_time: TimeArray  # [ns]
     header_time: TimeArray | None  # [ns]; None: the messages have no stamp
+    ticks: tuple[Decimal, ...] = ()  # of the field that is the clock, exact [as logged]
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,19 @@ class McapColumns:
     decoded_singly: int  # messages that went through the ordinary decoder
 
 
-def read_columns(content: ByteArray, wanted: Sequence[FieldPath]) -> McapColumns:
+def read_columns(
+    content: ByteArray, wanted: Sequence[FieldPath], *, clock: FieldPath | None = None
+) -> McapColumns:
     """Read the wanted fields of every message of their topics.
+
+    Parameters
+    ----------
+    content
+        The file.
+    wanted
+        The fields to read.
+    clock
+        The one of them that is the time, whose numbers are also kept exactly.
 
     Raises
     ------
@@ -72,7 +85,7 @@ def read_columns(content: ByteArray, wanted: Sequence[FieldPath]) -> McapColumns
             channel = walk.channels[number]
             if channel.topic in paths:
                 if number not in readers:
-                    readers[number] = _reader(walk, channel, paths[channel.topic])
+                    readers[number] = _reader(walk, channel, paths[channel.topic], clock)
                 readers[number].take(block, number)
     topics = {topic: _topic(walk, topic, readers) for topic in paths}
     return McapColumns(
@@ -81,6 +94,14 @@ def read_columns(content: ByteArray, wanted: Sequence[FieldPath]) -> McapColumns
         integrity=walk.integrity,
         decoded_singly=sum(reader.singly for reader in readers.values()),
     )
+
+
+def survey(content: ByteArray) -> Integrity:
+    """What is proved of a file's bytes, whatever its messages hold."""
+    walk = McapWalk(content)
+    for _ in walk.blocks():
+        pass
+    return walk.integrity
 
 
 def run_metadata(walk: McapWalk) -> dict[str, str]:
@@ -93,16 +114,21 @@ def run_metadata(walk: McapWalk) -> dict[str, str]:
     return merged
 
 
-def _reader(walk: McapWalk, channel: Channel, paths: list[FieldPath]) -> _ChannelReader:
+def _reader(
+    walk: McapWalk, channel: Channel, paths: list[FieldPath], clock: FieldPath | None
+) -> _ChannelReader:
+    clock = clock if clock in paths else None
     schema = walk.schemas.get(channel.schema_id) if channel.schema_id else None
     plain = (
-        channel.message_encoding == "cdr"
+        clock is None
+        and channel.message_encoding == "cdr"
         and schema is not None
         and schema.encoding == "ros2msg"
         and joint_state.is_joint_state(schema.name, schema.data.decode(errors="replace"))
         and all(len(path.steps) == 1 and path.steps[0].name in joint_state.SIGNALS for path in paths)
     )
-    return _ChannelReader(paths=paths, decode=decoder(channel, schema), plain=plain)
+    decode = decoder(channel, schema, exact=clock is not None)
+    return _ChannelReader(paths=paths, decode=decode, plain=plain, clock=clock)
 
 
 def _topic(walk: McapWalk, topic: str, readers: Mapping[int, _ChannelReader]) -> Topic:
@@ -127,6 +153,7 @@ def _topic(walk: McapWalk, topic: str, readers: Mapping[int, _ChannelReader]) ->
         log_time=np.concatenate([part.log_time for part in parts]),
         publish_time=np.concatenate([part.publish_time for part in parts]),
         header_time=np.concatenate(headers) if len(headers) == len(parts) else None,
+        ticks=tuple(tick for part in parts for tick in part.ticks),
     )
 
 
@@ -137,10 +164,12 @@ class _ChannelReader:
     paths: list[FieldPath]
     decode: Decode
     plain: bool  # whether a layout may be proved
+    clock: FieldPath | None = None  # which of the paths is the time
     singly: int = 0
     layouts: list[joint_state.Layout] = field(default_factory=list)
     columns: list[FloatArray] = field(default_factory=list)  # (paths, n) a block
     clocks: list[TimeArray] = field(default_factory=list)  # (3, n) a block: log, publish, header
+    ticks: list[Decimal] = field(default_factory=list)
 
     def take(self, block: Block, number: int) -> None:
         """Read this channel's messages of a block."""
@@ -157,6 +186,8 @@ class _ChannelReader:
             message = self.decode(raw)
             values[:, k] = [resolve(message, path) for path in self.paths]
             header[k] = header_stamp(message)
+            if self.clock is not None:
+                self.ticks.append(_exact(resolve_exactly(message, self.clock)))
             self.singly += 1
         self.columns.append(values)
         self.clocks.append(np.stack((found.log_time[mine], found.publish_time[mine], header)))
@@ -203,7 +234,12 @@ class _ChannelReader:
             log_time=clocks[0],
             publish_time=clocks[1],
             header_time=clocks[2] if np.all(clocks[2] != _NO_STAMP) else None,
+            ticks=tuple(self.ticks),
         )
+
+
+def _exact(value: Number) -> Decimal:
+    return Decimal(value.item() if isinstance(value, np.integer | np.floating) else value)
 
 
 def _place(shape: joint_state.Layout, path: FieldPath) -> int:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
+from decimal import Decimal
+from functools import partial
 from io import StringIO
 
 from mcap.records import Channel, Schema
@@ -20,8 +22,8 @@ from data.names import shown
 Decode = Callable[[bytes], object]
 
 
-def decoder(channel: Channel, schema: Schema | None) -> Decode:
-    """How to decode a channel's messages.
+def decoder(channel: Channel, schema: Schema | None, *, exact: bool = False) -> Decode:
+    """How to decode a channel's messages; with `exact`, decimals of a JSON text stay as they are written.
 
     Raises
     ------
@@ -33,7 +35,8 @@ def decoder(channel: Channel, schema: Schema | None) -> Decode:
         f"a schema in {shown(schema.encoding, 40)!r}" if schema else "no schema"
     )
     if encoding == "json":
-        return lambda raw: _guarded(json.loads, raw, topic)
+        loads = partial(json.loads, parse_float=Decimal) if exact else json.loads
+        return lambda raw: _guarded(loads, raw, topic)
     if encoding == "cdr" and schema is not None and schema.encoding == "ros2msg":
         try:
             # The parser prints what it cannot read, as it stands in the log, terminal escapes and all.

@@ -145,7 +145,7 @@ def _fields(message: object) -> tuple[Field, ...]:
     found = dict(leaves(message))
     for path, value in list(found.items())[:_MOST_FIELDS]:
         if isinstance(value, str | bytes) or not hasattr(value, "__len__"):
-            listed.append(Field(path, value if isinstance(value, int | float | str) else str(value)))
+            listed.append(Field(path, _plain(value)))
             continue
         elements = list(value) if hasattr(value, "__iter__") else []
         names = found.get(path.rpartition(".")[0] + "." * ("." in path) + "name")
@@ -153,3 +153,9 @@ def _fields(message: object) -> tuple[Field, ...]:
         first = elements[0] if elements and isinstance(elements[0], int | float | str) else None
         listed.append(Field(path, first, len(elements), joints if len(joints) == len(elements) else ()))
     return tuple(listed)
+
+
+def _plain(value: object) -> float | str:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return value
+    return str(value)

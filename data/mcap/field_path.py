@@ -11,13 +11,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Final
+from decimal import Decimal
+from typing import Any, Final
 
 import numpy as np
 
 from data.findings import LogError
 from data.names import nearest, shown
 
+Number = int | float | Decimal | np.integer[Any] | np.floating[Any]
 _STEP: Final = re.compile(r"([^.\[\]{}]+)(?:\[(\d{1,6})\]|\{([^{}]*)\})?(?:\.|$)")
 _DEEPEST: Final = 12  # nesting that is listed
 
@@ -63,12 +65,26 @@ def parse_path(text: str) -> FieldPath:
 
 
 def resolve(message: object, path: FieldPath) -> float:
-    """The number that the path leads to in a decoded message (attributes or mappings).
+    """The number that the path leads to in a decoded message (attributes or mappings), as a float.
 
     Raises
     ------
     LogError
         When a field is missing, an element is not there, or the end is no number.
+    """
+    try:
+        return float(resolve_exactly(message, path))
+    except OverflowError as error:
+        raise LogError(f"{path.text} holds an integer too large for a float") from error
+
+
+def resolve_exactly(message: object, path: FieldPath) -> Number:
+    """The number that the path leads to, as the decoder gives it.
+
+    Raises
+    ------
+    LogError
+        As `resolve`.
     """
     here = message
     for step in path.steps:
@@ -83,13 +99,13 @@ def resolve(message: object, path: FieldPath) -> float:
     return number(here, path.text)
 
 
-def number(value: object, path: str) -> float:
-    """A number as a float; the only element of an array of one.
+def number(value: object, path: str) -> Number:
+    """A number; the only element of an array of one.
 
     Raises
     ------
     LogError
-        When it is no number, or an array of more.
+        When it is no number (true and false are none), or an array of more.
     """
     if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes):
         if len(value) != 1:
@@ -97,12 +113,11 @@ def number(value: object, path: str) -> float:
                 f"{path} is an array of {len(value)} elements; say which, by [i] from 0 or {{joint}}"
             )
         value = value[0]
-    if not isinstance(value, int | float | np.number):
+    if isinstance(value, bool | np.bool_) or not isinstance(
+        value, int | float | Decimal | np.integer | np.floating
+    ):
         raise LogError(f"{path} is {_kind(value)}, not a number")
-    try:
-        return float(value)
-    except OverflowError as error:
-        raise LogError(f"{path} holds an integer too large for a float") from error
+    return value
 
 
 def leaves(message: object, prefix: str = "", depth: int = 0) -> Iterator[tuple[str, object]]:
@@ -145,4 +160,6 @@ def _fields(value: object) -> Mapping[str, object]:
 def _kind(value: object) -> str:
     if _fields(value):
         return "a group of fields (" + nearest("", _fields(value)) + ")"
+    if isinstance(value, bool | np.bool_):
+        return "true or false"
     return {"str": "text", "NoneType": "nothing", "bytes": "bytes"}.get(type(value).__name__, "an array")

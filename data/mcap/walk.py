@@ -114,7 +114,8 @@ class McapWalk:
                 self._count(block.messages)
                 yield block
         if not ended and not (self._losses and self._losses[-1].end == size):
-            self._losses.append(Loss(size, size, "it stops there: the recording was cut off"))
+            why = "it stops there: the recording was cut off"
+            self._losses.append(Loss(size, size, why, behind=self._latest()))
         promised = self._statistics.message_count if self._statistics else self._messages
         if promised != self._messages and not self._losses:
             why = f"the statistics promise {promised} messages, {self._messages} were found"
@@ -253,7 +254,17 @@ class McapWalk:
         if self._content[end : end + len(MAGIC)].tobytes() != MAGIC:
             self._losses.append(Loss(end, size, "it does not end as an MCAP file does"))
         elif size > end + len(MAGIC):
-            self._notes.append(f"{size - end - len(MAGIC)} bytes stand behind the end")
+            self._notes.append(self._behind(end + len(MAGIC)))
+
+    def _behind(self, end: int) -> str:
+        """What is to be said of bytes behind the end."""
+        rest = self._content[end:]
+        if rest[: len(MAGIC)].tobytes() == MAGIC:
+            return (
+                f"another MCAP file of {rest.size} bytes stands behind the end of the first and is not read; "
+                "split them, or merge them into one"
+            )
+        return f"{rest.size} bytes stand behind the end and are not read"
 
     def _lose(self, here: int, damage: Damage) -> int:
         """Note what is lost at `here`; where to go on."""
@@ -264,8 +275,12 @@ class McapWalk:
             after = next_chunk(self._content, here + 1)
         after = size if after is None else after
         begin = min(here, damage.where) if damage.resume else here
-        self._losses.append(Loss(begin, after, damage.why, extent[1] if extent else None))
+        self._losses.append(Loss(begin, after, damage.why, extent[1] if extent else None, self._latest()))
         return after
+
+    def _latest(self) -> int | None:
+        """The latest log time so far [ns]."""
+        return self._times[1] if self._times else None
 
     def _count(self, found: Messages) -> None:
         first, last = int(found.log_time.min()), int(found.log_time.max())

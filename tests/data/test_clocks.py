@@ -25,3 +25,12 @@ def test_none_and_one_stamp() -> None:
     for n in (0, 1):
         report = clock_report_ns(np.arange(n, dtype=np.int64))
         assert (report.samples, report.rate, report.duration) == (n, 0.0, 0.0)
+
+
+def test_one_stamp_that_was_never_set_does_not_blur_the_others() -> None:
+    stamps = 1_700_000_000_000_000_000 + np.arange(100, dtype=np.int64) * 1_000_000
+    stamps[0] = 0
+    report = clock_report_ns(stamps)
+    assert report.rate == 1000.0
+    assert report.jitter == 0.0
+    assert report.gaps == 1

@@ -1,13 +1,15 @@
 """The file door: real and written logs become recordings in SI, everything else a LogError that helps."""
 
+import json
 import os
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from data.csv.log import write_csv
-from data.findings import LogError
+from data.findings import LogError, Severity
 from data.ingest import read_recording
 from data.mcap.writer import write_mcap
 from data.recording import FloatArray, Recording
@@ -191,7 +193,12 @@ def test_a_cut_log_is_refused_and_salvaged_on_request(tmp_path: Path) -> None:
     ):
         read(path)
     kept = read(path, salvage=True)
-    assert [finding.code for finding in kept.findings] == ["E-DAMAGE"]
+    assert [(finding.code, finding.severity) for finding in kept.findings] == [
+        ("E-DAMAGE", Severity.WITHHOLD)
+    ]
+    assert re.search(
+        r"lost bytes \d+ to \d+, behind log time [\d.]+ s: .*Kept \d+ messages", kept.findings[0].text
+    )
     assert 5000 < kept.time.size < 30_000
     assert np.array_equal(kept.torque, long_columns()["effort"][: kept.time.size])
 
@@ -225,3 +232,138 @@ def test_a_clock_that_jumps_back_is_refused(tmp_path: Path) -> None:
         LogError, match=r"run.mcap: E-CLOCK refuse: the clock .header stamps. jumps back by 0.499 s"
     ):
         read(path)
+
+
+def test_damage_is_told_before_what_it_leaves_missing(tmp_path: Path) -> None:
+    content = write(tmp_path / "run.mcap").read_bytes()
+    flipped = bytearray(content)
+    flipped[len(content) // 2] ^= 0x40
+    for name, damaged in (
+        ("flip", bytes(flipped)),
+        ("half", content[: len(content) // 2]),
+        ("head", content[:8]),
+        ("noise", content[:8] + np.random.default_rng(0).bytes(5000)),
+        ("text", b"t,q,u\n0,0,0\n"),
+    ):
+        path = tmp_path / f"{name}.mcap"
+        path.write_bytes(damaged)
+        for salvage in (False, True):
+            with pytest.raises(
+                LogError, match=f"{name}.mcap is damaged at bytes .* Nothing in it can be saved"
+            ):
+                read(path, salvage=salvage)
+
+
+def test_a_topic_missing_from_what_was_salvaged_is_told_with_the_damage(tmp_path: Path) -> None:
+    path = write(tmp_path / "run.mcap", time=np.arange(30_000, dtype=np.float64) * 1e-3, **long_columns())
+    path.write_bytes(path.read_bytes()[:-400])
+    signals = RigSignals(
+        mcap=Signals(position=Signal("/other:position"), torque=Signal("/joint_states:effort"))
+    )
+    with pytest.raises(LogError, match="is damaged at bytes"):
+        read(path, signals)
+    with pytest.raises(LogError, match=r"no topic '/other'.*salvaged: lost bytes"):
+        read(path, signals, salvage=True)
+
+
+def test_what_stands_behind_the_end_is_said_and_nothing_else_changes(tmp_path: Path) -> None:
+    path = write(tmp_path / "run.mcap")
+    content = path.read_bytes()
+    whole = read(path)
+    for rest, why in ((b"x" * 100, "100 bytes stand behind the end"), (content, "another MCAP file of")):
+        path.write_bytes(content + rest)
+        got = read(path)
+        assert [(finding.code, finding.severity) for finding in got.findings] == [("E-FILE", Severity.WARN)]
+        assert why in got.findings[0].text
+        assert np.array_equal(got.torque, whole.torque)
+
+
+CSV = RigSignals(csv=Signals(position=Signal("q"), torque=Signal("u"), time=Signal("t")))
+
+
+def test_a_damaged_row_is_refused_by_its_line_and_salvaged_on_request(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    write_csv(path, columns={"t": TIME, "q": POSITION, "u": TORQUE}, metadata={"r": "1"})
+    lines = path.read_text().splitlines()
+    lines[1001], lines[2001] = "#N/A" + lines[1001][5:], lines[2001] + ",7"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(
+        LogError, match=r"run.csv is damaged .* line 1002 begins with '#N/A.* \(and 1 more places"
+    ):
+        read(path, CSV)
+    got = read(path, CSV, salvage=True)
+    assert got.time.size == 2998
+    assert (got.findings[0].code, got.findings[0].severity) == ("E-DAMAGE", Severity.WITHHOLD)
+    assert "line 2002 has 4 cells" in got.findings[0].text
+    assert np.array_equal(got.time, np.delete(TIME, [999, 1999]))
+
+
+def test_a_last_row_that_may_be_cut_is_left_out_and_said(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    write_csv(path, columns={"t": TIME, "q": POSITION, "u": TORQUE})
+    path.write_bytes(path.read_bytes()[:-12])
+    got = read(path, CSV)
+    assert got.time.size == 2999
+    assert [(finding.code, finding.severity) for finding in got.findings] == [("E-FILE", Severity.WARN)]
+    assert "it may be cut off and was left out" in got.findings[0].text
+
+
+@pytest.mark.parametrize("unit", ["s", "ns"])
+def test_a_date_as_time_costs_no_precision(tmp_path: Path, unit: str) -> None:
+    rows = zip(range(3000), POSITION.tolist(), TORQUE.tolist(), strict=True)
+    form = "1700000{:06d}000000" if unit == "ns" else "1700000{:03d}.{:03d}5"
+    path = tmp_path / "run.csv"
+    path.write_text(
+        "t,q,u\n" + "".join(f"{_stamp(k, form)},{position!r},{torque!r}\n" for k, position, torque in rows)
+    )
+    signals = RigSignals(
+        csv=Signals(position=Signal("q"), torque=Signal("u"), time=Signal("t", unit=unit, offset=-1.7e9))
+    )
+    assert np.allclose(read(path, signals).time, TIME, rtol=3e-16, atol=0)
+
+
+def _stamp(k: int, form: str) -> str:
+    return form.format(k) if "06d" in form else form.format(*divmod(k, 1000))
+
+
+def test_a_field_that_counts_nanoseconds_since_a_date_costs_no_precision(tmp_path: Path) -> None:
+    bodies = [
+        {"t": 1_700_000_000_000_000_001 + k * 1_000_000, "q": position, "u": torque}
+        for k, (position, torque) in enumerate(zip(POSITION.tolist(), TORQUE.tolist(), strict=True))
+    ]
+    messages = [hostile.message(1, k, json.dumps(body).encode()) for k, body in enumerate(bodies)]
+    path = tmp_path / "run.mcap"
+    path.write_bytes(hostile.file(hostile.channel(1, 0, "/s", "json"), *messages))
+    timed = Signals(position=Signal("/s:q"), torque=Signal("/s:u"), time=Signal("/s:t", unit="ns"))
+    assert np.allclose(read(path, RigSignals(mcap=timed)).time, TIME, rtol=3e-16, atol=0)
+
+
+def _zero_first(path: Path, zeros: int) -> Path:
+    """A log whose first messages carry log time 0, as latched ones do."""
+    bodies = [{"q": q, "u": u} for q, u in zip(POSITION.tolist(), TORQUE.tolist(), strict=True)]
+    stamps = [0 if k < zeros else 1_700_000_000_000_000_000 + k * 1_000_000 for k in range(TIME.size)]
+    messages = [
+        hostile.message(1, t, json.dumps(body).encode()) for t, body in zip(stamps, bodies, strict=True)
+    ]
+    path.write_bytes(hostile.file(hostile.channel(1, 0, "/s", "json"), *messages))
+    return path
+
+
+def test_latched_messages_have_no_place_on_the_log_s_clock(tmp_path: Path) -> None:
+    signals = RigSignals(mcap=Signals(position=Signal("/s:q"), torque=Signal("/s:u"), clock="log"))
+    got = read(_zero_first(tmp_path / "run.mcap", 2), signals)
+    assert np.array_equal(got.time, np.arange(2998) / 1000)
+    assert np.array_equal(got.torque, TORQUE[2:])
+    assert [(finding.code, finding.severity) for finding in got.findings] == [("E-CLOCK", Severity.WARN)]
+    assert "2 sample(s) at the start carry time 0" in got.findings[0].text
+    whole = read(_zero_first(tmp_path / "run.mcap", 0), signals)
+    assert whole.findings == ()
+
+
+def test_a_clock_that_leaps_years_is_refused(tmp_path: Path) -> None:
+    time = TIME.copy()
+    time[1500:] += 1.7e9
+    path = tmp_path / "run.csv"
+    write_csv(path, columns={"t": time, "q": POSITION, "u": TORQUE})
+    with pytest.raises(LogError, match=r"E-CLOCK refuse: the clock \(column 't'\) jumps ahead by 1.7e\+09 s"):
+        read(path, CSV)

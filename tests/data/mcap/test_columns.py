@@ -2,6 +2,7 @@
 
 import json
 import struct
+from decimal import Decimal
 
 import numpy as np
 import pytest
@@ -105,14 +106,15 @@ def test_nested_fields_of_any_message() -> None:
         hostile.channel(1, 1, "/s", "cdr"),
         *(hostile.message(1, k, raw) for k in range(3)),
     )
-    wanted = [parse_path(p) for p in ("/s:motor.current", "/s:pair[1]", "/s:raw", "/s:on")]
+    wanted = [parse_path(p) for p in ("/s:motor.current", "/s:pair[1]", "/s:raw")]
     read = read_columns(np.frombuffer(content, np.uint8), wanted)
-    assert [read.topics["/s"].values[p.text][2] for p in wanted] == [2.5, -2.0, 65535.0, 1.0]
+    assert [read.topics["/s"].values[p.text][2] for p in wanted] == [2.5, -2.0, 65535.0]
     assert read.topics["/s"].header_time is None
     assert read.decoded_singly == 3
     for path, why in (
         ("/s:motor", "group of fields"),
         ("/s:label", "text, not a number"),
+        ("/s:on", "true or false, not a number"),
         ("/s:motors.current", "no field 'motors'.*motor"),
         ("/s:pair", "array of 2 elements"),
         ("/s:pair[2]", "no element 2"),
@@ -135,6 +137,28 @@ def test_json_with_and_without_schema(with_schema: bool) -> None:
     assert topic.values["/j:motor.i{b}"].tolist() == [2.5]
     assert topic.header_time is not None
     assert topic.header_time.tolist() == [3_000_000_004]
+
+
+@pytest.mark.parametrize("value", ["true", "false", "[true]"])
+def test_true_and_false_are_no_numbers(value: str) -> None:
+    content = hostile.file(
+        hostile.channel(1, 0, "/j", "json"), hostile.message(1, 9, b'{"u": %s}' % value.encode())
+    )
+    with pytest.raises(LogError, match="/j:u is true or false, not a number"):
+        read_columns(np.frombuffer(content, np.uint8), [parse_path("/j:u")])
+
+
+@pytest.mark.parametrize(
+    "texts", [["1700000000123456789", "1700000000123456790"], ["1700000000.0001", "1.7e9"]]
+)
+def test_the_field_that_is_the_clock_is_kept_as_it_is_written(texts: list[str]) -> None:
+    bodies = [b'{"t": %s, "u": 0.1}' % text.encode() for text in texts]
+    messages = [hostile.message(1, k, body) for k, body in enumerate(bodies)]
+    content = np.frombuffer(hostile.file(hostile.channel(1, 0, "/j", "json"), *messages), np.uint8)
+    time, torque = parse_path("/j:t"), parse_path("/j:u")
+    topic = read_columns(content, [time, torque], clock=time).topics["/j"]
+    assert topic.ticks == tuple(Decimal(text) for text in texts)
+    assert topic.values["/j:u"].tolist() == [0.1, 0.1]
 
 
 def test_unread_encodings_and_broken_messages_are_refused_by_name(capfd: pytest.CaptureFixture[str]) -> None:
