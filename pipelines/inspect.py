@@ -63,8 +63,8 @@ def inspect_log(path: Path) -> Inspection:
     """
     begin = time.perf_counter()
     log = path.as_posix()
+    content = read_bytes(path, log=log)  # a file that is not there has no ending to speak of
     file_format = log_format(path)
-    content = read_bytes(path, log=log)
     found: McapDescription | CsvDescription
     if file_format == "mcap":
         found = mcap_description.describe(content)

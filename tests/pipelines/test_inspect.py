@@ -135,3 +135,41 @@ def test_names_from_a_log_are_only_names(tmp_path: Path) -> None:
     table = tmp_path / "run.csv"
     table.write_bytes(b"# a\x1b[31m: \x1b[32mb\nt,\x1b[31mq[bold]\n0,1\n1,2\n")
     assert "\x1b[3" not in drawn(table)
+
+
+def test_a_file_that_is_not_there_is_told_before_its_ending(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="nothere: there is no such file"):
+        inspect_log(tmp_path / "nothere")
+    (tmp_path / "log.bag").write_bytes(b"#ROSBAG")
+    with pytest.raises(LogError, match="logs are read by their ending"):
+        inspect_log(tmp_path / "log.bag")
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [("0.5,1,2,3", "line 51 has 4 cells"), ("#N/A,1", "line 51 begins with '#N/A'"), (None, "is cut off")],
+)
+def test_a_table_with_one_damaged_row_is_readable_in_part(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], line: str | None, why: str
+) -> None:
+    lines = ["t,q", *(f"{0.01 * k:.4f},{0.03 * k * k:.4f}" for k in range(100))]
+    if line is not None:
+        lines[50] = line
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(lines)[: None if line else -3])
+    assert inspect_logs([path], as_json=True) is Status.WITHHELD
+    found = json.loads(capsys.readouterr().out)
+    assert (found["status"], found["rows"]) == ("partly readable", 99)
+    assert why in found["integrity"]["lost"][0]["why"]
+    assert "99 rows" in drawn(path)
+
+
+def test_a_clock_that_counts_from_a_date_has_its_exact_rate(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(
+        "__time,q\n" + "".join(f"{1_700_000_000 + k // 1000}.{k % 1000:03d},0.5\n" for k in range(3000))
+    )
+    clock = to_plain(inspect_log(path))["clock"]
+    assert clock["rate"] == pytest.approx(1000.0, rel=1e-12)
+    assert clock["jitter"] < 1e-12
+    assert clock["start"] == 1.7e9
