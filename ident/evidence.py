@@ -101,7 +101,7 @@ def require_evidence(recordings: Sequence[Recording], evidence: Evidence) -> Non
 
 
 def run_uses(recordings: Sequence[Recording], evidence: Evidence) -> tuple[RunUse, ...]:
-    """Every log once: whether it was used, and if not, why."""
+    """Every log once: whether it was used, and if not, or only what was salvaged of it, why."""
     used = {run.log for run in evidence.used_runs} | {start.log for start in evidence.used_starts}
     reasons: dict[str, list[str]] = {}
     for log, why, _ in _left_out(evidence):
@@ -112,7 +112,8 @@ def run_uses(recordings: Sequence[Recording], evidence: Evidence) -> tuple[RunUs
     for recording in recordings:
         log = recording.log
         if log in used:
-            uses.append(RunUse(log, recording.sha256, recording.protocol, used=True))
+            lost = "; ".join(f.text for f in recording.findings if f.severity is Severity.WITHHOLD)
+            uses.append(RunUse(log, recording.sha256, recording.protocol, used=True, why=lost or None))
             continue
         if recording.protocol == "set_point":
             why = "a set-point run: the prediction is held against it, nothing is fitted to it"
