@@ -2,7 +2,8 @@ r"""Which gains, and which compensator: the advice that follows from the design 
 
 *Observer gain.* It must exceed the robot's worst critical gain, upper end of the interval included, by a
 margin in which the error decays faster than the loop moves: L = max(L_c, 0) + max(5 % of L_c, twice the
-loop's own decay rate).
+loop's own decay rate). Where the proportional and derivative gains are not known, the loop's rate is not
+either: the 5 % alone are the margin then, and the advice says so.
 
 *Compensation gain.* Overcompensation makes the loop cycle; undercompensation leaves a rest error that shrinks
 as r grows. So: as much as is surely not too much. A compensator with r g^(s) <= g(s) at every speed s nowhere
@@ -43,7 +44,7 @@ class Advice:
     compensator: Law
     observer_gain: float | None  # [1/s]; None: no finite gain will do
     compensation_gain: float  # [-]
-    largest_rest_error: float | None  # [rad], of the fitted robot; None without an observer gain
+    largest_rest_error: float | None  # [rad], of the fitted robot; None without L, n1 and n2
     why: str
 
 
@@ -66,8 +67,8 @@ def overcompensation_thresholds(robot: OneLinkRobot, model: StribeckFriction) ->
 def recommend(
     robot: OneLinkRobot,
     *,
-    proportional: float,
-    derivative: float,
+    proportional: float | None,
+    derivative: float | None,
     worst_gain_high: float | None = None,
     thresholds: ThresholdEnds | None = None,
 ) -> tuple[Advice, ...]:
@@ -76,20 +77,18 @@ def recommend(
     `worst_gain_high` [1/s] is the upper 95 % end of the worst critical gain, `thresholds` the lower ends of
     the overcompensation thresholds; without them 1 % of uncertainty is assumed for r, and none for L.
     """
+    pd = None if proportional is None or derivative is None else (proportional, derivative)
     symmetric = robot.friction.positive == robot.friction.negative
     laws: tuple[Law, ...] = ("mean",) if symmetric else ("per-direction", "mean")
     return tuple(
-        _advice(
-            robot, law, (proportional, derivative), worst_gain_high=worst_gain_high, thresholds=thresholds
-        )
-        for law in laws
+        _advice(robot, law, pd, worst_gain_high=worst_gain_high, thresholds=thresholds) for law in laws
     )
 
 
 def _advice(
     robot: OneLinkRobot,
     law: Law,
-    pd: tuple[float, float],
+    pd: tuple[float, float] | None,
     *,
     worst_gain_high: float | None,
     thresholds: ThresholdEnds | None,
@@ -104,10 +103,12 @@ def _advice(
         doubt = "the lower 95 % end of the fit"
     r = math.floor(1e4 * r) / 1e4 if math.isfinite(r) else 1.0
     high = critical_observer_gains(robot).worst if worst_gain_high is None else worst_gain_high
-    rate = loop_decay(Controller(Gains(*pd, observer=0.0, compensation=r), model)).rate
+    rate = 0.0
+    if pd is not None:
+        rate = loop_decay(Controller(Gains(*pd, observer=0.0, compensation=r), model)).rate
     L = None if math.isinf(high) else max(high, 0.0) + max(_GAIN_MARGIN * high, 2.0 * rate)
     error = None
-    if L is not None:
+    if L is not None and pd is not None:
         error = equilibrium_set(
             robot, Controller(Gains(*pd, observer=L, compensation=r), model)
         ).largest_error
@@ -116,7 +117,16 @@ def _advice(
         observer_gain=L,
         compensation_gain=r,
         largest_rest_error=error if error is None or math.isfinite(error) else None,
-        why=_reason(robot, model, law, limits, r=r, doubt=doubt, high=high, L=L),
+        why=_reason(robot, model, law, limits, r=r, doubt=doubt, high=high, L=L) + _pace(pd),
+    )
+
+
+def _pace(pd: tuple[float, float] | None) -> str:
+    if pd is not None:
+        return ""
+    return (
+        " The loop's own speed and the rest error that remains are not known without the proportional and "
+        "derivative gains: with them L may have to be larger."
     )
 
 

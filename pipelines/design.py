@@ -16,6 +16,10 @@
   "why", "cautions", "alternatives"}`;
 - `gains`, `law`, `compensator`, `draws`, `seed`, `withheld`: what was asked, and what could not be answered.
 
+A campaign without set-point runs tells no gains of the loop, and `run` still designs what needs none: `gains`
+is null then, `decay_rate` is withheld, `equilibrium_sets` and `certificates` are empty, and `withheld` says
+why; the critical gains, the thresholds and the recommendation stand.
+
 Intervals are 2.5 and 97.5 % quantiles over robots drawn from the fit's joint normal distribution. The
 published robot has none: its intervals are null. It moves with the mean of Table 1's columns, and both
 columns are reported.
@@ -60,7 +64,7 @@ class Design:
     """All of design.json, and what its figures need."""
 
     name: str
-    gains: Gains
+    gains: Gains | None  # None: not known
     law: LawChoice
     compensator: str
     critical: Mapping[str, Quantity]
@@ -81,14 +85,18 @@ class Design:
 
 def design(
     source: RobotFile,
-    gains: Gains,
+    gains: Gains | None,
     *,
+    without_gains: str = "the gains of the loop are not known",
     law: LawChoice = "per-direction",
     compensator: LawChoice | None = None,
     draws: int = DRAWS,
     seed: int = 0,
 ) -> Design:
-    """The design of a robot file; what a withheld parameter leaves open is null with the reason."""
+    """The design of a robot file; what a withheld parameter leaves open is null with the reason.
+
+    So is what needs gains where they are None: `without_gains` says why they are.
+    """
     if source.published:
         law = "mean"  # the paper's robot is the mean of its columns
     robot = published.asymmetric_robot() if source.published else source.fitted
@@ -117,22 +125,16 @@ def design(
     drawn = drawn_robots(source, draws, seed)
     critical = critical_gains(robot, drawn)
     moving, model = source.moving(law), source.compensating(compensator)
-    controller = Controller(gains, model)
     worst_high = critical["worst"].interval95[1] if critical["worst"].interval95 is not None else None
-    return replace(
+    unpaced = replace(
         nothing,
         critical=critical,
-        decay=decay_rates(moving, controller, [one.mean() if law == "mean" else one for one in drawn]),
+        decay={name: Quantity(None, "1/s", withheld=without_gains) for name in RATES},
         thresholds=threshold_values(robot),
-        rests=tuple(
-            (r, equilibrium_set(moving, Controller(replace(gains, compensation=r), model)))
-            for r in sorted({0.0, 1.0, gains.compensation})
-        ),
-        certificates=_all_certificates(robot, gains),
         advice=recommend(
             robot,
-            proportional=gains.proportional,
-            derivative=gains.derivative,
+            proportional=None if gains is None else gains.proportional,
+            derivative=None if gains is None else gains.derivative,
             worst_gain_high=worst_high,
             thresholds=threshold_ends(robot, drawn),
         ),
@@ -140,12 +142,24 @@ def design(
         moving=moving,
         model=model,
     )
+    if gains is None:
+        return replace(unpaced, withheld=(*nothing.withheld, without_gains))
+    controller = Controller(gains, model)
+    return replace(
+        unpaced,
+        decay=decay_rates(moving, controller, [one.mean() if law == "mean" else one for one in drawn]),
+        rests=tuple(
+            (r, equilibrium_set(moving, Controller(replace(gains, compensation=r), model)))
+            for r in sorted({0.0, 1.0, gains.compensation})
+        ),
+        certificates=_all_certificates(robot, gains),
+    )
 
 
 def write_design(result: Design, folder: ResultFolder) -> None:
-    """design.json, and figure4.svg and figure8.svg where the robot is identified."""
+    """design.json, and figure4.svg and figure8.svg where the robot and the gains are known."""
     folder.write_json("design.json", DESIGN_SCHEMA, _document(result))
-    if result.moving is None or result.model is None:
+    if result.moving is None or result.model is None or result.gains is None:
         return
     from pipelines.report.equilibrium_figures import figure4, figure8  # noqa: PLC0415  (matplotlib)
     from pipelines.report.style import svg_text  # noqa: PLC0415
@@ -216,7 +230,9 @@ def _document(result: Design) -> dict[str, object]:
         "critical_observer_gain": result.critical,
         "decay_rate": result.decay,
         "overcompensation_threshold": result.thresholds,
-        "equilibrium_sets": [_rest_document(r, found, result.gains) for r, found in result.rests],
+        "equilibrium_sets": [
+            _rest_document(r, found, result.gains) for r, found in result.rests if result.gains is not None
+        ],
         "certificates": [
             {"robot": name, **asdict(one), "unit": _unit(one.unit, result.axis)}
             for name, one in result.certificates

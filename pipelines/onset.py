@@ -9,7 +9,8 @@ does. The interval of the prediction holds 95 % of the onsets of robots that are
 distribution, each found by bisection around the fitted robot's own.
 
 Whether a loop cycles may stay undecided (`pipelines.run_outcomes` bounds how long it is watched). The scan
-then goes on; where nothing cycles, or the step before the first cycle is undecided, the reason says so.
+then goes on: right at the onset a loop takes its time. Where nothing cycles, or several steps below the
+first cycle are undecided, there is no onset, and the reason says so.
 """
 
 from __future__ import annotations
@@ -34,6 +35,7 @@ SAME_START: Final = 0.05  # of the largest |x1(0)|
 SCAN_STEP: Final = 0.01  # of r
 BEYOND: Final = 0.2  # of r: how far past the recorded runs a scan goes
 TOLERANCE: Final = 2e-4  # of r
+FEWEST_UNKNOWN: Final = 3  # steps below the first cycle that leave an onset open; fewer are its own slowness
 BLOCK: Final = 4  # values of a scan that are predicted at a time
 DRAWN_STEP: Final = 0.004  # of r: first bracket around the fitted robot's onset
 DRAWN_TOLERANCE: Final = 0.002  # of r
@@ -142,7 +144,7 @@ def smallest_cycling(loop: LoopAsRun, gains: FloatArray, predict: Verdicts) -> F
         return Found(None, why + (f" ({_undecided(unknown)})" if unknown else ""))
     if first == 0:
         return Found(None, f"every r down to {gains[0]:g} cycles from this start")
-    if before[-1].verdict not in DECIDED:
+    if all(outcome.verdict not in DECIDED for outcome in before[-FEWEST_UNKNOWN:]):
         return Found(None, f"cycles at r = {gains[first]:g}; below, {_undecided(unknown)}")
     low, high = float(gains[first - 1]), float(gains[first])
     while high - low > TOLERANCE:

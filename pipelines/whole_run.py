@@ -8,7 +8,8 @@ a question needs, that question says why and the others go on; the run then ends
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -34,7 +35,13 @@ from pipelines.results.manifest import Command, versions, write_manifest
 from pipelines.results.robot_file import RobotFile, read_robot, withheld_parameters
 from pipelines.robot_questions import axis_of, predict_robot
 from pipelines.settings.campaign import Campaign
-from pipelines.settings.gains import GainOptions, chosen_gains, chosen_sampling, with_exact
+from pipelines.settings.gains import (
+    GainOptions,
+    MissingGainsError,
+    chosen_gains,
+    chosen_sampling,
+    with_exact,
+)
 from pipelines.settings.loop import LawChoice
 
 PICTURES = ("figure2", "figure4", "figure6", "figure7", "figure8", "figure9", "figure10")
@@ -96,24 +103,58 @@ def compare_campaign(
 def run_campaign(
     campaign: Campaign, folder: ResultFolder, options: RunOptions, *, command: str, progress: Progress
 ) -> list[str]:
-    """All of `run`, from robot.json to manifest.json; returns what was withheld or left out, in sentences."""
+    """All of `run`, from robot.json to manifest.json; returns what was withheld or left out, in sentences.
+
+    Raises `UsageError` before a log is read where the options make no sense.
+    """
+    _check_usage(campaign, options)
     with opened_map(options.jobs or 1) as spread:
         logs = read_logs(campaign, IDENTIFYING, salvage=options.salvage, map=spread, progress=progress)
         set_point = set_point_logs(campaign, salvage=options.salvage, map=spread, progress=progress)
     missing, robot = _identified(campaign, logs, folder, options, progress)
     source = read_robot(folder.path / "robot.json")
+    left_out: dict[str, str] = {}  # what a question lacks, for the report
     loop = with_exact(source.loop, options.gains)
     try:
         gains = chosen_gains(loop, options.gains, source=source.name)
-    except UsageError as failure:
-        missing.append(f"design and predict are left out: {failure}")
+    except MissingGainsError as failure:
+        left_out["predict"] = str(failure)
+        missing.append(f"predict, and what of design needs gains, are left out: {failure}")
+        _design_without_gains(source, folder, options, str(failure))
     else:
+        if source.fitted is None:
+            left_out["predict"] = "; ".join(source.missing())
         missing += _answer_for_robot(source, gains, folder, options, set_point.runs, progress)
+    if not set_point.runs:
+        left_out["compare"] = f"{campaign.path.name} has no set-point runs"
     missing += _answer_for_runs(campaign, source, set_point, folder, options, progress)
-    write_report(folder, campaign, truth=read_truth(campaign), simulated=robot.simulated)
+    write_report(folder, campaign, truth=read_truth(campaign), simulated=robot.simulated, left_out=left_out)
     inputs = {**inputs_of(logs), **inputs_of(set_point)}
     _conclude(folder, campaign, options, command, missing, inputs, simulated=robot.simulated)
     return missing
+
+
+def _check_usage(campaign: Campaign, options: RunOptions) -> None:
+    """Raise `UsageError` for a sweep or a gain that makes no sense, while nothing has been written."""
+    if options.over:
+        one_sweep(options.over)
+    loop = with_exact(campaign.loop_defaults(), options.gains)
+    with suppress(MissingGainsError):
+        chosen_gains(loop, options.gains, source=campaign.path.name)
+    chosen_sampling(loop, options.gains)
+
+
+def _design_without_gains(source: RobotFile, folder: ResultFolder, options: RunOptions, why: str) -> None:
+    """The part of design that needs no gains of the loop."""
+    found = design(
+        source,
+        None,
+        without_gains=why,
+        law=options.law,
+        compensator=options.compensator,
+        seed=options.seed,
+    )
+    write_design(found, folder)
 
 
 def _identified(
@@ -243,7 +284,12 @@ def read_truth(campaign: Campaign) -> dict[str, object] | None:
 
 
 def write_report(
-    folder: ResultFolder, campaign: Campaign, *, truth: dict[str, object] | None, simulated: bool
+    folder: ResultFolder,
+    campaign: Campaign,
+    *,
+    truth: dict[str, object] | None,
+    simulated: bool,
+    left_out: Mapping[str, str],
 ) -> None:
     """report.html from the files that this run has written."""
 
@@ -266,6 +312,7 @@ def write_report(
         comparison=document("comparison.json"),
         manifest={"versions": versions(), "files": folder.written},
         truth=truth,
+        left_out=left_out,
         fit_report=(folder.path / "fit_report.txt").read_text(encoding="utf-8"),
         figures=pictures,
         axis=campaign.rig.axis,

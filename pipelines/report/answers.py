@@ -59,7 +59,7 @@ def which_gains(design: Mapping[str, Any] | None, units: AxisUnits) -> Answer:
     question = "Which gains?"
     if not design:
         return Answer(
-            question, "No design", "none", ("No complete friction law, so no gains are recommended.",)
+            question, "No design", "none", ("This run made no design, so no gains are recommended.",)
         )
     recommended: Mapping[str, Any] = design.get("recommended") or {}
     parts = [
@@ -85,17 +85,23 @@ def which_gains(design: Mapping[str, Any] | None, units: AxisUnits) -> Answer:
     elif worst:
         why = shown(str(worst.get("withheld") or "the law is infinitely steep at rest"), 300)
         lines.append(f"No finite critical observer gain: {why}.")
+    lines += [shown(str(why), 600) for why in design.get("withheld") or () if not design.get("gains")]
     return Answer(
         question, ", ".join(parts) or "None recommended", "good" if parts else "caution", tuple(lines)
     )
 
 
-def does_it_match(comparison: Mapping[str, Any] | None, units: AxisUnits) -> Answer:
-    """How many recorded runs do what was predicted from their own start, and where cycling sets in."""
+def does_it_match(
+    comparison: Mapping[str, Any] | None, units: AxisUnits, left_out: str | None = None
+) -> Answer:
+    """How many recorded runs do what was predicted from their own start, and where cycling sets in.
+
+    `left_out` says why there is no comparison, where there is none.
+    """
     question = "Does the prediction match the recorded runs?"
     if not comparison or not comparison.get("runs"):
         return Answer(
-            question, "No set-point runs", "none", ("The campaign recorded none, or the law is incomplete.",)
+            question, "No comparison", "none", (shown(left_out or "There are no compared runs.", 600),)
         )
     runs: Sequence[Mapping[str, Any]] = comparison["runs"]
     decided = [

@@ -35,6 +35,7 @@ def report_page(
     comparison: Mapping[str, Any] | None = None,
     manifest: Mapping[str, Any] | None = None,
     truth: Mapping[str, Any] | None = None,
+    left_out: Mapping[str, str] | None = None,
     fit_report: str | None = None,
     figures: Mapping[str, str] | None = None,
     axis: str = "rotary",
@@ -43,7 +44,8 @@ def report_page(
     """The page as HTML text.
 
     `robot`, `design`, `diagram`, `comparison`, `manifest` and `truth` as their JSON files hold them;
-    `figures` maps "figure2" ... "figure10" to SVG text. Raises `PictureError` for a picture that this tool
+    `left_out` says of "predict" and "compare" why there is no answer; `figures` maps "figure2" ... "figure10"
+    to SVG text. Raises `PictureError` for a picture that this tool
     cannot have made.
     """
     units = units_of(axis)
@@ -55,7 +57,8 @@ def report_page(
         rig=rig,
         simulated=simulated or bool((robot or {}).get("simulated")),
         units=units,
-        answers=_answers(robot, entries, design, comparison, units=units),
+        left_out=left_out or {},
+        answers=_answers(robot, entries, design, comparison, units=units, left_out=left_out or {}),
         law=_by_parameter(entries),
         entries=entries,
         truth=truth,
@@ -116,9 +119,10 @@ def _answers(
     comparison: Mapping[str, Any] | None,
     *,
     units: AxisUnits,
+    left_out: Mapping[str, str],
 ) -> list[Answer]:
     sure = [how_sure(robot, entries)] if robot else []
-    return [*sure, which_gains(design, units), does_it_match(comparison, units)]
+    return [*sure, which_gains(design, units), does_it_match(comparison, units, left_out.get("compare"))]
 
 
 def _by_parameter(entries: Sequence[Entry]) -> list[tuple[str, list[Entry]]]:

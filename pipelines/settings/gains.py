@@ -26,6 +26,10 @@ OPTIONS: Final = {
 }
 
 
+class MissingGainsError(UsageError):
+    """A loop that neither the robot's campaign nor the command line tells in full."""
+
+
 @dataclass(frozen=True)
 class GainOptions:
     """What the command line said; None where it was silent."""
@@ -57,7 +61,7 @@ def with_exact(defaults: LoopDefaults, options: GainOptions) -> LoopDefaults:
 
 
 def chosen_gains(defaults: LoopDefaults, options: GainOptions, *, source: str) -> Gains:
-    """All four gains; raises `UsageError` naming every option that is missing.
+    """All four gains; raises `MissingGainsError` naming all that are missing, `UsageError` for bad ones.
 
     `source` is how a message calls the robot file. The caller gives a swept gain its first value.
     """
@@ -65,7 +69,7 @@ def chosen_gains(defaults: LoopDefaults, options: GainOptions, *, source: str) -
     values = {name: getattr(loop, name) for name in OPTIONS}
     missing = [OPTIONS[name] for name, value in values.items() if value is None]
     if missing:
-        raise UsageError(
+        raise MissingGainsError(
             f"{source} gives no single value for {' and '.join(missing)} (its campaign has no set-point "
             "runs, or they differ): say it on the command line"
         )

@@ -53,7 +53,7 @@ def fitted(relative_error: float = 0.01, **positive: Estimate) -> RobotFile:
     return RobotFile("robot.json", Owner("bench"), identified.robot(), identified, LoopDefaults())
 
 
-def written(source: RobotFile, folder: Path, gains: Gains = GAINS, **choices: Any) -> dict[str, Any]:
+def written(source: RobotFile, folder: Path, gains: Gains | None = GAINS, **choices: Any) -> dict[str, Any]:
     write_design(design(source, gains, **choices), ResultFolder(folder, source.owner))
     content: dict[str, Any] = json.loads((folder / "design.json").read_text(encoding="utf-8"))
     return content
@@ -182,3 +182,21 @@ def test_worst_is_the_larger_direction() -> None:
     assert robot is not None
     found = critical_observer_gains(robot)
     assert found.worst == found.positive > found.mean > found.negative
+
+
+def test_what_needs_no_gains_is_designed_without_them(tmp_path: Path) -> None:
+    why = "the campaign has no set-point runs"
+    document = written(fitted(), tmp_path, None, without_gains=why)
+    with_gains = written(fitted(), tmp_path)
+    assert document["critical_observer_gain"] == with_gains["critical_observer_gain"]
+    assert document["overcompensation_threshold"] == with_gains["overcompensation_threshold"]
+    assert document["gains"] is None
+    assert document["withheld"] == [why]
+    assert {entry["withheld"] for entry in document["decay_rate"].values()} == {why}
+    assert document["equilibrium_sets"] == document["certificates"] == []
+    advice, usual = document["recommended"], with_gains["recommended"]
+    assert advice["compensation_gain"] == usual["compensation_gain"]
+    assert document["critical_observer_gain"]["worst"]["value"] < advice["observer_gain"]
+    assert advice["observer_gain"] <= usual["observer_gain"]
+    assert advice["largest_rest_error"] is None
+    assert "not known without the proportional" in advice["why"]

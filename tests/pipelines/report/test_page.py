@@ -167,7 +167,7 @@ def test_every_part_is_optional(part: str) -> None:
 
 def test_nothing_at_all_is_still_a_page() -> None:
     text = "".join(_walk(report_page(name="empty")).text)
-    assert "No set-point runs" in text
+    assert "No comparison" in text
     assert "No design" in text
 
 
