@@ -14,9 +14,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+
+STEEPEST_SHAPE: Final = 100.0
 
 
 class ModelError(ValueError):
@@ -52,6 +55,11 @@ class StribeckCurve:
             raise ModelError(f"stribeck_velocity is {self.stribeck_velocity:g} rad/s: v_s > 0 (eq 3)")
         if self.stribeck_shape <= 0:
             raise ModelError(f"stribeck_shape is {self.stribeck_shape:g}: beta > 0 (eq 3)")
+        if self.stribeck_shape > STEEPEST_SHAPE:
+            raise ModelError(
+                f"stribeck_shape is {self.stribeck_shape:g}: beta <= {STEEPEST_SHAPE:g}, above which the "
+                "fall at v_s is a jump that no record resolves (eq 3)"
+            )
         if self.viscous_damping < 0:
             raise ModelError(f"viscous_damping is {self.viscous_damping:g} N m s/rad: b >= 0 (eq 1)")
 
@@ -63,7 +71,8 @@ class StribeckCurve:
     def dry(self, speed: ArrayLike) -> NDArray[np.float64]:
         """Dry friction magnitude g(s) [N m] at speeds s >= 0 [rad/s], any shape; F_s at 0. Eq (3)."""
         s = np.asarray(speed, dtype=np.float64)
-        fading = np.exp(-((s / self.stribeck_velocity) ** self.stribeck_shape))
+        with np.errstate(over="ignore", under="ignore"):  # (s/v_s)^beta may be infinite: exp(-inf) is 0
+            fading = np.exp(-((s / self.stribeck_velocity) ** self.stribeck_shape))
         return self.coulomb_torque + self.stribeck_torque * fading
 
     def total(self, speed: ArrayLike) -> NDArray[np.float64]:

@@ -88,7 +88,7 @@ def table1_csv(robot: Mapping[str, Any], *, truth: Mapping[str, Any] | None = No
     simulated = bool(robot.get("simulated"))
     rows = [
         (
-            entry.parameter, entry.symbol, entry.direction, entry.value, _csv_unit(entry.unit), entry.stderr,
+            entry.parameter, entry.symbol, entry.direction, entry.value, entry.unit, entry.stderr,
             *(entry.interval95 or (None, None)), entry.fixed, entry.withheld, entry.paper, entry.truth,
             simulated,
         )
@@ -149,10 +149,6 @@ def table1_tex(robot: Mapping[str, Any], *, truth: Mapping[str, Any] | None = No
     lines += [r"\hline", r"\end{tabular}"]
     lines += [f"% $J$ = {_tex_value(entries[0])} {_tex(entries[0].unit)}"]
     return "\n".join(lines) + "\n"
-
-
-def _csv_unit(unit: str) -> str:
-    return "1" if unit == "-" else unit
 
 
 def _entry(

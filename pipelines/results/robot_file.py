@@ -178,7 +178,8 @@ def _parsed(path: Path) -> RobotDocument:
     except ValidationError as failure:
         first = failure.errors(include_url=False)[0]
         key = ".".join(map(str, first["loc"])) or "the file"
-        raise RobotFileError(f"{path}: {key}: {first['msg']}; {remedy}") from None
+        rule = first["msg"].removeprefix("Value error, ")
+        raise RobotFileError(f"{path}: {key}: {rule}; {remedy}") from None
 
 
 def _no_constant(word: str) -> NoReturn:

@@ -13,6 +13,7 @@ from data.recording import Axis
 from ident.estimate import CURVE_PARAMETERS
 from pipelines.settings.loop import ObserverUpdate
 
+SAME_MEAN: Final = 1e-6  # relative
 FREE_PARAMETERS: Final = {
     "inertia",
     *(f"{direction}.{name}" for direction in ("positive", "negative") for name in CURVE_PARAMETERS),
@@ -27,7 +28,13 @@ class _Entry(BaseModel):
     model_config = ConfigDict(strict=True, frozen=True, extra="ignore")
 
 
-class EstimateEntry(_Entry):
+class _Closed(_Entry):
+    """As above, but without unknown keys: a slip in a parameter must not pass for its absence."""
+
+    model_config = ConfigDict(strict=True, frozen=True, extra="forbid")
+
+
+class EstimateEntry(_Closed):
     """One parameter."""
 
     value: Number | None
@@ -41,10 +48,13 @@ class EstimateEntry(_Entry):
     def _reason(self) -> Self:
         if self.value is None and not self.withheld:
             raise ValueError("value is null: `withheld` must say why")
+        low, high = self.interval95 or (None, None)
+        if low is not None and high is not None and low > high:
+            raise ValueError(f"interval95 is [{low:g}, {high:g}]: the lower end comes first")
         return self
 
 
-class CurveEntry(_Entry):
+class CurveEntry(_Closed):
     """The five parameters of one direction."""
 
     static_torque: EstimateEntry
@@ -162,3 +172,16 @@ class RobotDocument(_Entry):
     campaign: CampaignEntry | None = None
     runs: tuple[RunEntry, ...] = ()
     notes: tuple[NoteEntry, ...] = ()
+
+    @model_validator(mode="after")
+    def _mean_of_both(self) -> Self:
+        for name in CURVE_PARAMETERS if self.mean is not None else ():
+            entries = [getattr(curve, name) for curve in (self.positive, self.negative, self.mean)]
+            ahead, back, mean = (entry.value for entry in entries)
+            if None in (ahead, back, mean):
+                continue
+            if abs(mean - 0.5 * (ahead + back)) > SAME_MEAN * (abs(ahead) + abs(back)):
+                raise ValueError(
+                    f"mean.{name} is {mean:g}: the mean of {ahead:g} and {back:g}, or leave `mean` out"
+                )
+        return self

@@ -16,23 +16,28 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path, PurePath
 from types import MappingProxyType
+from typing import get_args
 
+import numpy as np
 from pydantic import ValidationError
 
 from data.findings import LogError
 from data.protocols import ProtocolName
 from data.recording import Axis
-from data.signals import CsvDialect, Format, RigSignals, Signal, Signals, log_format
+from data.signals import SUFFIXES, CsvDialect, Format, RigSignals, Signal, Signals, log_format
+from data.units import Quantity
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from pipelines.results.folder import Owner
 from pipelines.settings.campaign_error import CampaignError, explained, nearest
 from pipelines.settings.campaign_schema import (
+    FORMATS,
     METADATA,
     SIGNAL_NAMES,
     CampaignDocument,
     CompensatorTable,
     CurveTable,
     ExperimentTable,
+    RigTable,
     SignalsTable,
     SignalTable,
 )
@@ -137,7 +142,7 @@ def load_campaign(path: Path, *, logs_exist: bool = True) -> Campaign:
     except ValidationError as failure:
         raise CampaignError(explained(path, table, failure)) from None
     name = _name(path)
-    reader = _Reader(path, document.signals, logs_exist)
+    reader = _Reader(path, document.signals, document.rig, logs_exist)
     return Campaign(
         path=path,
         name=name,
@@ -169,6 +174,7 @@ class _Reader:
 
     path: Path
     signals: SignalsTable
+    rig: RigTable
     logs_exist: bool
 
     def experiment(self, number: int, entry: ExperimentTable) -> Experiment:
@@ -202,6 +208,12 @@ class _Reader:
             except (OSError, ValueError) as failure:
                 raise CampaignError(f"{where}: logs: {pattern!r} is no file pattern ({failure})") from None
             files = [name for name in matches if (folder / name).is_file()]
+            for name in matches:
+                if (folder / name).is_dir() and PurePath(name).suffix.lower() in SUFFIXES:
+                    raise CampaignError(
+                        f"{where}: logs: {pattern!r} matches {name!r}, which is a folder and no log. Rename "
+                        "it, or name the logs more narrowly"
+                    )
             if not files and self.logs_exist:
                 raise CampaignError(
                     f"{where}: logs: {pattern!r} matches no file in {folder}. Correct the pattern, or "
@@ -230,7 +242,7 @@ class _Reader:
         tables = {name: getattr(entry, name) or getattr(self.signals, name) for name in SIGNAL_NAMES}
         dialect = entry.dialect or self.signals.dialect
         try:
-            csv, mcap = _named_signals(tables, "csv"), _named_signals(tables, "mcap")
+            csv, mcap = (_named_signals(tables, kind, self.rig) for kind in FORMATS)
             used = {log: log_format(Path(log)) for log in logs}
         except LogError as failure:
             raise CampaignError(f"{where}: {failure}") from None
@@ -285,15 +297,17 @@ class _Reader:
         return Compensator(friction, table.inertia or table.positive.inertia or table.negative.inertia)
 
 
-def _named_signals(tables: Mapping[str, SignalTable | None], log_kind: Format) -> Signals:
-    """What the logs of one format call things; raises `LogError` for an unknown unit."""
+def _named_signals(tables: Mapping[str, SignalTable | None], log_kind: Format, rig: RigTable) -> Signals:
+    """What the logs of one format call things; raises `LogError` for a unit that does not fit."""
     found: dict[str, Signal] = {}
     for name, table in tables.items():
         source = None if table is None else table.csv if log_kind == "csv" else table.mcap
         if table is not None and source is not None:
             unit = table.unit.get(log_kind)
             try:
-                found[name] = Signal(source, unit, scale=table.scale, sign=table.sign, offset=table.offset)
+                signal = Signal(source, unit, scale=table.scale, sign=table.sign, offset=table.offset)
+                _require_kind(name, signal, rig)
+                found[name] = signal
             except LogError as failure:
                 raise LogError(f"{name}: {failure}") from None
     time = tables["time"]
@@ -305,6 +319,13 @@ def _named_signals(tables: Mapping[str, SignalTable | None], log_kind: Format) -
         reference=found.get("reference"),
         clock=None if time is None else time.clock,
     )
+
+
+def _require_kind(name: str, signal: Signal, rig: RigTable) -> None:
+    """Raise `LogError` for a unit that does not fit: deg of a torque, A without a scale."""
+    for quantity in get_args(Quantity):
+        if quantity == name and signal.unit is not None:
+            signal.to_si(np.zeros(1), quantity=quantity, axis=rig.axis, encoder_counts=rig.encoder_counts)
 
 
 def _stribeck_curve(table: CurveTable | CompensatorTable) -> StribeckCurve:

@@ -7,7 +7,6 @@ in front of it by `pipelines.settings.campaign_error`.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Annotated, Final, Literal, Self
 
@@ -15,12 +14,14 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from data.protocols import ProtocolName
 from data.recording import Axis
+from data.signals import Format
 from pipelines.settings.loop import ObserverUpdate
 from pipelines.settings.virtual_rig import VirtualRig
 
 METADATA: Final = "metadata:"  # a gain that stands in each log
-FORMATS: Final = ("csv", "mcap")
+FORMATS: Final[tuple[Format, ...]] = ("csv", "mcap")
 SIGNAL_NAMES: Final = ("time", "position", "torque", "velocity", "reference")
+LARGEST_GAIN: Final = 1e9
 SET_POINT_KEYS: Final = (
     "proportional_gain",
     "derivative_gain",
@@ -55,8 +56,8 @@ def _gain(value: object) -> object:
 def _finite_gain(value: object, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ValueError(f"{value!r}{where} is no number: a gain is a number >= 0")  # noqa: TRY004  (pydantic's way)
-    if not math.isfinite(value) or value < 0:
-        raise ValueError(f"{value}{where}: a gain is a finite number >= 0")
+    if not 0 <= value <= LARGEST_GAIN:
+        raise ValueError(f"{value}{where}: a gain is a number from 0 to {LARGEST_GAIN:g}")
     return float(value)
 
 
@@ -70,6 +71,19 @@ def _unit(value: object) -> object:
     if unknown:
         raise ValueError(f"{unknown[0]!r} is no log format: {' or '.join(FORMATS)}")
     return dict(value)
+
+
+def _column(value: object) -> object:
+    """The text of a CSV column's header, or its number."""
+    if isinstance(value, bool) or not isinstance(value, (int, str)) or (isinstance(value, int) and value < 0):
+        raise ValueError(f"{value!r} is no column: give its header's text, or its number from 0")
+    return value
+
+
+def _sign(value: object) -> object:
+    if isinstance(value, bool) or value not in (1, -1):
+        raise ValueError(f"{value!r} is no sign: give 1 or -1")
+    return value
 
 
 GainEntry = Annotated[float | str | dict[str, float], BeforeValidator(_gain)]
@@ -94,11 +108,11 @@ class RigTable(_Table):
 class SignalTable(_Table):
     """One signal: where it stands in each format, and what one logged unit is."""
 
-    csv: str | Annotated[int, Field(ge=0)] | None = None
+    csv: Annotated[str | int | None, BeforeValidator(_column)] = None
     mcap: str | None = None
     unit: UnitEntry = Field(default_factory=dict)
     scale: Number | None = None
-    sign: Literal[1, -1] = 1
+    sign: Annotated[Literal[1, -1], BeforeValidator(_sign)] = 1
     offset: Number = 0.0
     clock: Literal["header", "log", "publish"] | None = None
 

@@ -76,3 +76,10 @@ def test_at_rest_the_law_is_an_interval_between_the_two_static_torques() -> None
 def test_what_no_friction_can_be_is_refused_by_name(values: tuple[float, ...], named: str) -> None:
     with pytest.raises(ModelError, match=named):
         StribeckCurve(*values)
+
+
+def test_the_steepest_shape_is_bounded_and_overflows_nowhere() -> None:
+    with pytest.raises(ModelError, match="beta <= 100"):
+        StribeckCurve(0.6, 0.4, 0.07, 0.1, stribeck_shape=1e9)
+    steep = StribeckCurve(0.6, 0.4, 0.07, 0.1, stribeck_shape=100.0)
+    np.testing.assert_allclose(steep.dry([0.0, 0.01, 1e3, 1e300]), [0.6, 0.6, 0.4, 0.4])

@@ -135,7 +135,17 @@ HOSTILE: dict[str, tuple[Callable[[Document], object], str]] = {
     "true": (lambda d: d["inertia"].update(value=True), "inertia.value: Input should be a valid number"),
     "no reason": (lambda d: d["inertia"].update(value=None), "inertia: .*`withheld` must say why"),
     "no robot": (lambda d: d["inertia"].update(value=-1.0), "inertia is -1 kg m"),
-    "law": (lambda d: d["negative"]["static_torque"].update(value=0.1), "F_s >= F_c"),
+    "law": (lambda d: (d.pop("mean"), d["negative"]["static_torque"].update(value=0.1)), "F_s >= F_c"),
+    "jump": (lambda d: (d.pop("mean"), d["positive"]["stribeck_shape"].update(value=1e9)), "beta <= 100"),
+    "mean": (
+        lambda d: d["mean"]["static_torque"].update(value=0.9),
+        r"mean\.static_torque is 0\.9: the mean of",
+    ),
+    "swapped": (
+        lambda d: d["inertia"].update(interval95=[0.03, 0.02]),
+        r"inertia: interval95 is \[0\.03, 0\.02\]: the lower end",
+    ),
+    "slip": (lambda d: d["inertia"].update(stder=0.1), r"inertia\.stder: Extra inputs"),
     "protocol": (lambda d: d["runs"][0].update(protocol="x"), "runs.0.protocol"),
     "names": (lambda d: d["covariance"].update(names=["inertia"]), "covariance: .* 1 names"),
     "unknown name": (

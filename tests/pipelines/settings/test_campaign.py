@@ -105,6 +105,10 @@ def test_a_campaign_is_called_by_its_file_or_its_folder(tmp_path: Path, name: st
 
 
 BROKEN = {
+    "true sign": ("sign = -1", "sign = true", "torque.sign: True is no sign: give 1 or -1"),
+    "no column": ('csv = "i"', "csv = -1", "torque.csv: -1 is no column: give its header's text"),
+    "angle of a torque": ('unit = "A", scale = 0.12', 'unit = "deg"', "torque: 'deg' measures angle"),
+    "huge gain": ("proportional_gain = 0.4", "proportional_gain = 1e22", "a gain is a number from 0 to"),
     "unknown table": ("[rig]", "[rigg]", "rigg: unknown key; the nearest known one is 'rig'"),
     "unknown key": ("observer_gain", "observer_gian", r"observer_gian: unknown key; .* 'observer_gain'"),
     "unknown signal key": ("scale", "scall", "torque.scall: unknown key; the nearest known one is 'scale'"),
@@ -158,6 +162,13 @@ def test_a_broken_rule_is_said_with_file_and_key(tmp_path: Path, old: str, new: 
     with pytest.raises(CampaignError, match=message) as refusal:
         loaded(tmp_path, TEXT.replace(old, new))
     assert str(refusal.value).startswith(str(tmp_path / "bench.toml"))
+
+
+def test_a_folder_that_is_named_like_a_log_is_said(tmp_path: Path) -> None:
+    path = written(tmp_path)
+    (tmp_path / "velocity" / "p9.csv").mkdir()
+    with pytest.raises(CampaignError, match=r"velocity.p9\.csv', which is a folder"):
+        load_campaign(path)
 
 
 def test_files_that_are_no_campaign(tmp_path: Path) -> None:
