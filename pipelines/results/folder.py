@@ -16,6 +16,8 @@ import hashlib
 import io
 import json
 import math
+import re
+import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
@@ -24,9 +26,12 @@ from typing import Final
 import numpy as np
 
 from data.files import write_atomically
+from data.names import shown
 from pipelines.exit_status import UsageError
 
 MANIFEST: Final = "manifest.json"
+PARTIAL: Final = re.compile(r"\..+\.[0-9a-f]{8}\.partial")  # as `data.files.write_atomically` names them
+STALE: Final = 60.0  # [s] after which nobody is still writing it
 MANIFEST_SCHEMA: Final = "stribeck/manifest/1"
 
 
@@ -74,6 +79,9 @@ class ResultFolder:
     def claim(self) -> None:
         """Say whose folder this is before anything lies in it: an interrupted command can be rerun."""
         self.path.mkdir(parents=True, exist_ok=True)
+        for entry in self.path.iterdir():
+            if _is_leftover(entry) and time.time() - entry.stat().st_mtime > STALE:
+                entry.unlink(missing_ok=True)
         claim = json_text(MANIFEST_SCHEMA, {"campaign": self.owner.campaign, "rig": self.owner.rig})
         write_atomically(self.path / MANIFEST, claim.encode("utf-8"))
 
@@ -82,17 +90,19 @@ def open_results(out: Path, owner: Owner, *, force: bool = False) -> ResultFolde
     """The folder to write into; raises `UsageError` where something else is in the way. Writes nothing."""
     folder = ResultFolder(path=out, owner=owner)
     for parent in (out, *out.parents):
+        if parent.is_symlink() and not parent.exists():
+            raise UsageError(f"{parent} is a link to nothing: name another folder with -o")
         if parent.exists():
             if not parent.is_dir():
                 raise UsageError(f"{parent} is a file, not a folder: name another folder with -o")
             break
-    if force or not out.exists() or not any(out.iterdir()):
+    if force or not out.exists() or all(map(_is_leftover, out.iterdir())):
         return folder
     holder = folder_owner(out)
     if holder == owner:
         return folder
     if holder is None:
-        found = sorted(entry.name for entry in out.iterdir())
+        found = sorted(entry.name for entry in out.iterdir() if not _is_leftover(entry))
         shown = ", ".join(found[:3]) + (f" and {len(found) - 3} more" if len(found) > 3 else "")
         what = f"holds {shown}, which no command of ours wrote"
     else:
@@ -103,6 +113,11 @@ def open_results(out: Path, owner: Owner, *, force: bool = False) -> ResultFolde
         + ". Name another folder with -o, or say --force to write into this one (nothing is "
         "deleted, files of the same name are replaced)."
     )
+
+
+def _is_leftover(entry: Path) -> bool:
+    """Whether a command of ours that was killed while it wrote left this: `.NAME.8 hex digits.partial`."""
+    return PARTIAL.fullmatch(entry.name) is not None and entry.is_file() and not entry.is_symlink()
 
 
 def folder_owner(out: Path) -> Owner | None:
@@ -128,7 +143,8 @@ def json_text(schema: str, values: Mapping[str, object]) -> str:
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """A comma-separated table; floats read back bit for bit, None is an empty cell.
 
-    A text that a spreadsheet would take for a formula gets an apostrophe in front; numbers never do.
+    A text that a spreadsheet would take for a formula gets an apostrophe in front; numbers never do. Line
+    ends and what could steer a terminal are shown as what they are: names come from logs.
     """
     sheet = io.StringIO()
     writer = csv.writer(sheet, lineterminator="\n")
@@ -142,8 +158,9 @@ def _cell(value: object) -> object:
     value = plain(value)
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, str) and value.startswith(("=", "+", "-", "@", "\t", "\r")):
-        return "'" + value
+    if isinstance(value, str):
+        text = shown(value, 4 * len(value))
+        return "'" + text if value.startswith(("=", "+", "-", "@", "\t", "\r")) else text
     if isinstance(value, float):
         return repr(value) if math.isfinite(value) else ""
     return "" if value is None else value

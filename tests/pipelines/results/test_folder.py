@@ -109,7 +109,33 @@ def test_floats_come_back_bit_for_bit(values: list[float]) -> None:
     assert [float(cell) for cell in row] == values
 
 
-@pytest.mark.parametrize("text", ["=1+1", "+1", "-x", "@sum", "\ttab"])
+@pytest.mark.parametrize("text", ["=1+1", "+1", "-x", "@sum"])
 def test_a_text_cell_is_no_formula_and_a_number_stays_one(text: str) -> None:
     rows = list(csv.reader(io.StringIO(csv_text(["a", "b", "c", "d"], [[text, -1.5, None, True]]))))
     assert rows[1] == ["'" + text, "-1.5", "", "true"]
+
+
+def test_what_a_killed_command_left_is_ours_and_goes_once_it_is_stale(tmp_path: Path) -> None:
+    fresh, stale = (tmp_path / f".robot.json.{tail}.partial" for tail in ("0a1b2c3d", "89abcdef"))
+    fresh.write_text("half")
+    stale.write_text("half")
+    os.utime(stale, (0, 0))
+    open_results(tmp_path, BENCH).write_text("x.txt", "x")
+    assert entries(tmp_path) == [fresh.name, MANIFEST, "x.txt"]
+
+
+def test_only_our_own_leftovers_are_passed_over(tmp_path: Path) -> None:
+    (tmp_path / ".thesis.partial").write_text("years of work")
+    with pytest.raises(UsageError, match="which no command of ours wrote"):
+        open_results(tmp_path, BENCH)
+
+
+def test_a_link_to_nothing_is_said(tmp_path: Path) -> None:
+    (tmp_path / "out").symlink_to(tmp_path / "nowhere")
+    with pytest.raises(UsageError, match="is a link to nothing"):
+        open_results(tmp_path / "out", BENCH)
+
+
+def test_a_name_from_a_log_steers_no_terminal() -> None:
+    text = csv_text(["log"], [["a\x1b[31m\nb\r.csv"]])
+    assert text == "log\na\\x1b[31m\\nb\\r.csv\n"
