@@ -99,12 +99,13 @@ def record(
 @ends_well
 def inspect(
     logs: Annotated[list[Path], typer.Argument(help="The logs.", show_default=False)],
+    quiet: option.Quiet = False,
     as_json: option.Json = False,
 ) -> Status:
     """What a log holds, with no settings at all: channels, units, rate, clock, gaps, integrity."""
     from pipelines.terminal.inspection import inspect_logs
 
-    return inspect_logs(logs, as_json=as_json)
+    return inspect_logs(logs, as_json=as_json, quiet=quiet)
 
 
 @app.command()
@@ -199,7 +200,7 @@ def simulate(
     from compensation.controller import Controller
     from pipelines.results.folder import open_results
     from pipelines.results.robot_file import read_robot
-    from pipelines.robot_questions import conclude, counted_resolution
+    from pipelines.robot_questions import axis_of, conclude, counted_resolution
     from pipelines.settings.gains import chosen_gains, chosen_sampling
     from pipelines.simulate import parse_format, parse_start, simulate_loop, write_trajectory
 
@@ -210,7 +211,10 @@ def simulate(
     sampling = chosen_sampling(source.loop, given, resolution=counted_resolution(source, encoder_counts))
     controller = Controller(gains, source.compensating(compensator))
     folder = open_results(_place(out, source.owner), source.owner, force=force)
-    run = simulate_loop(source.moving(law), controller, start=start, duration=duration, sampling=sampling)
+    run = simulate_loop(
+        source.moving(law), controller,
+        start=start, duration=duration, sampling=sampling, axis=axis_of(source),
+    )  # fmt: skip
     path = write_trajectory(run, folder, form=written_as)
     options = {"x0": list(start), "duration": duration, "law": law, "compensator": compensator}
     conclude(folder, source, "simulate", options)

@@ -21,7 +21,7 @@ from compensation.closed_loop import ClosedLoop
 from compensation.controller import Controller
 from compensation.sampled_bifurcation import sampled_cycles
 from compensation.sampled_loop import Map, Sampling
-from data.recording import FloatArray
+from data.recording import Axis, FloatArray
 from ident.model.robot import OneLinkRobot
 from pipelines.exit_status import UsageError
 from pipelines.progress import Progress, Silent
@@ -81,6 +81,7 @@ def predict(
     sweep: Sweep,
     *,
     sampling: Sampling | None = None,
+    axis: Axis = "rotary",
     map: Map = map,
     progress: Progress | None = None,
 ) -> Prediction:
@@ -99,7 +100,10 @@ def predict(
         tick=tick,
     )
     rests = tuple(branch for branch in ideal.branches if branch.kind != "limit_cycle")
-    counts = f"encoder counts of {sampling.resolution:.6g}" if sampling.resolution else "exact positions"
+    unit = "rad" if axis == "rotary" else "m"
+    counts = (
+        f"encoder counts of {sampling.resolution:.6g} {unit}" if sampling.resolution else "exact positions"
+    )
     notes = [
         f"limit cycles: runs of {cycles.duration:.4g} s from x1 = {cycles.starts[0]:.4g} and "
         f"{cycles.starts[1]:.4g}, the larger cycle counts; rests: those of the continuous loop"

@@ -54,7 +54,13 @@ def predict_robot(
     controller = Controller(gains, source.compensating(compensator))
     with opened_threads(jobs) as spread:
         result = predict(
-            source.moving(law), controller, sweep, sampling=sampling, map=spread, progress=progress
+            source.moving(law),
+            controller,
+            sweep,
+            sampling=sampling,
+            axis=axis_of(source),
+            map=spread,
+            progress=progress,
         )
     write_prediction(
         result, folder, title=source.owner.campaign, axis=axis_of(source), simulated=source.simulated

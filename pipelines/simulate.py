@@ -23,7 +23,7 @@ from compensation.closed_loop import ClosedLoop, simulate, torque
 from compensation.controller import Controller
 from compensation.sampled_loop import Sampling, run_sampled
 from data.mcap.writer import write_mcap
-from data.recording import FloatArray
+from data.recording import Axis, FloatArray
 from ident.model.robot import OneLinkRobot
 from ident.response import respond
 from pipelines.exit_status import RefusalError, UsageError
@@ -34,6 +34,7 @@ FORMATS: Final[tuple[Format, ...]] = get_args(Format)
 HEADER: Final = ("t", "x1", "x2", "x3", "v", "u")
 OUTPUT_STEP: Final = 1e-3  # [s] between the rows of a continuous run
 MOST_ROWS: Final = 200_000  # of a continuous run
+MOST_TURNS: Final = 1e4  # that a continuous run may take before its gains are to blame
 MOST_SAMPLES: Final = 5_000_000  # of a sampled run
 _START_WORDS: Final = 3
 
@@ -81,13 +82,14 @@ def simulate_loop(
     start: tuple[float, float, float],
     duration: float,
     sampling: Sampling | None = None,
+    axis: Axis = "rotary",
 ) -> SimulatedRun:
     """One run from `start` (x1, x2, x3) for `duration` [s]; raises `UsageError` for what cannot be run."""
     if not (math.isfinite(duration) and duration > 0):
         raise UsageError(f"--duration is {duration:g}: give a finite number of seconds > 0")
     if sampling is None:
         return _continuous(robot, controller, start, duration)
-    return _sampled(robot, controller, sampling, start=start, duration=duration)
+    return _sampled(robot, controller, sampling, start=start, duration=duration, axis=axis)
 
 
 def write_trajectory(run: SimulatedRun, folder: ResultFolder, *, form: Format = "csv") -> Path:
@@ -122,7 +124,7 @@ def _continuous(
     if not np.all(np.isfinite(found.state)):
         raise RefusalError(
             f"the run stopped at t = {found.end_time:.6g} s of {duration:g} s ({found.end_reason}): nothing "
-            "is written. Ask for a shorter --duration"
+            f"is written. {_remedy(robot, controller, found.end_time)}"
         )
     return SimulatedRun(
         time=found.time,
@@ -133,6 +135,18 @@ def _continuous(
     )
 
 
+def _remedy(robot: OneLinkRobot, controller: Controller, reached: float) -> str:
+    """What to change: the time, if the loop turned many times in what was reached, else the gains."""
+    turns = reached * math.sqrt(controller.gains.proportional / robot.inertia) / (2.0 * math.pi)
+    if reached > 0.0 and turns < MOST_TURNS:
+        return f"Ask for a --duration below {reached:.3g} s"
+    return (
+        "The loop is too fast to be followed: its turns last "
+        f"{2.0 * math.pi * math.sqrt(robot.inertia / controller.gains.proportional):.3g} s. Give gains that "
+        "a rig can have"
+    )
+
+
 def _sampled(
     robot: OneLinkRobot,
     controller: Controller,
@@ -140,6 +154,7 @@ def _sampled(
     *,
     start: tuple[float, float, float],
     duration: float,
+    axis: Axis,
 ) -> SimulatedRun:
     if start[1] != 0.0:
         raise UsageError(
@@ -152,6 +167,13 @@ def _sampled(
             f"{MOST_SAMPLES:,} samples: ask for less"
         )
     run = run_sampled(robot, controller, sampling, start=(start[0], start[2]), duration=duration)
+    if run.end == "runs away":
+        until, product = run.time.size * sampling.period, controller.gains.observer * sampling.period
+        raise RefusalError(
+            f"the sampled controller is unstable: its estimate runs away at t = {until:.4g} s "
+            f"(L h = {product:.3g}; Euler's rule diverges from 2 on): "
+            "nothing is written. Sample faster, or lower the observer or proportional gain"
+        )
     time, position, velocity = run.time, run.position, run.velocity
     estimate, held = run.estimate, run.torque
     rest = duration - float(time[-1])
@@ -162,7 +184,10 @@ def _sampled(
         time = np.append(time, duration)
         position, velocity = np.append(position, q[-1]), np.append(velocity, v[-1])
         estimate, held = np.append(estimate, estimate[-1]), np.append(held, held[-1])
-    counts = f"encoder counts of {sampling.resolution:.6g}" if sampling.resolution else "exact positions"
+    unit = "rad" if axis == "rotary" else "m"
+    counts = (
+        f"encoder counts of {sampling.resolution:.6g} {unit}" if sampling.resolution else "exact positions"
+    )
     return SimulatedRun(
         time=time,
         state=np.column_stack((position, estimate, velocity - estimate)),

@@ -86,7 +86,7 @@ def figure10(
     main.set(xlabel="compensation gain $r$", ylabel=f"$x_1$ at rest, $\\max|x_1|$ of a cycle [{unit}]")
     reach = [float(run["r"]) for run in runs]
     if reach:
-        spare = 0.03 * (max(reach) - min(reach)) or 0.02
+        spare = 0.03 * (max(reach) - min(reach)) or 0.02 * max(1.0, *reach)
         main.set_xlim(min(reach) - spare, max(reach) + spare)
     handles = _legend(runs, colours, unit, fitted=fitted is not None, symmetric=symmetric is not None)
     legend_beside(main, handles)

@@ -28,7 +28,7 @@ def draw_onsets(axes: Axes, onsets: Sequence[Onset], colours: Mapping[str, str],
     several = len({str(onset.get("gains")) for onset in onsets}) > 1
     numbers = [float(x) for onset in onsets for x in _numbers(onset)]
     low, high = (min(numbers), max(numbers)) if numbers else (0.9, 1.1)
-    spare = 0.12 * (high - low) or 0.02
+    spare = 0.12 * (high - low) or 0.02 * max(1.0, abs(high))
     for row, onset in enumerate(onsets):
         colour = colours[start_label(onset["start"])]
         _draw_bracket(

@@ -34,8 +34,8 @@ _MOST_ROWS: Final = 40
 _MOST_LOSSES: Final = 8
 
 
-def inspect_logs(logs: Sequence[Path], *, as_json: bool = False) -> Status:
-    """Inspect logs and print each; the gravest status of all."""
+def inspect_logs(logs: Sequence[Path], *, as_json: bool = False, quiet: bool = False) -> Status:
+    """Inspect logs and print each, or only errors where `quiet`; the gravest status of all."""
     worst, answers = Status.DONE, []
     for path in logs:
         try:
@@ -51,7 +51,7 @@ def inspect_logs(logs: Sequence[Path], *, as_json: bool = False) -> Status:
             worst = inspection.status
         if as_json:
             answers.append(to_plain(inspection))
-        else:
+        elif not quiet:
             print_inspection(inspection)
     if as_json:
         whole = answers[0] if len(answers) == 1 else {"schema": MANY, "logs": answers}

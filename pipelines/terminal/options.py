@@ -16,7 +16,7 @@ RobotSource = Annotated[str, typer.Argument(help="A robot.json, or the word `pap
 Out = Annotated[
     Path | None,
     typer.Option(
-        "--out", "-o", help="Result folder [default: stribeck-out/<campaign name>].", rich_help_panel=_OUTPUT
+        "--out", "-o", help="Result folder (default: stribeck-out/<campaign name>).", rich_help_panel=_OUTPUT
     ),
 ]
 Force = Annotated[
@@ -49,7 +49,7 @@ Compensator = Annotated[
     Literal["per-direction", "mean"] | None,
     typer.Option(
         "--compensator",
-        help="The law in the controller [default: the campaign's, else the mean].",
+        help="The law in the controller (default: the campaign's, else the mean).",
         show_default=False,
     ),
 ]

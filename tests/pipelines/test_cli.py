@@ -334,3 +334,47 @@ def test_a_defect_of_ours_is_one_line_and_a_traceback_only_on_request(
     assert "\x1b" not in result.stderr
     monkeypatch.setenv("STRIBECK_DEBUG", "1")
     assert "Traceback" in stribeck("paper", "-o", tmp_path / "out").stderr
+
+
+def test_without_set_point_runs_the_true_reason_is_said_and_the_rest_is_done(
+    copied: Path, tmp_path: Path
+) -> None:
+    text = copied.read_text(encoding="utf-8")
+    head, tail = text.index('[[experiment]]\nprotocol = "set_point"'), text.index("\n[virtual_rig]")
+    copied.write_text(text[:head] + text[tail:], encoding="utf-8")
+    out = tmp_path / "out"
+    result = stribeck("run", copied, "-o", out)
+    assert result.exit_code == 3, result.output
+    design = json.loads((out / "design.json").read_text(encoding="utf-8"))
+    assert design["critical_observer_gain"]["worst"]["value"] == pytest.approx(94.4, rel=0.15)
+    assert design["recommended"]["observer_gain"] is not None
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "No complete friction law" not in page
+    assert "--proportional" in page
+    assert "has no set-point runs" in page
+
+
+@pytest.mark.parametrize("words", [("--over", "junk"), ("--proportional", "-1"), ("--sample-period", "nan")])
+def test_run_checks_its_options_before_it_writes(
+    recorded: Path, tmp_path: Path, words: tuple[str, str]
+) -> None:
+    assert_refused(stribeck("run", recorded, "-o", tmp_path / "out", *words), 2, words[0])
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("scale", ["1e-300", "1e300"])
+def test_a_torque_of_no_rig_is_refused(copied: Path, tmp_path: Path, scale: str) -> None:
+    spoil(copied, 'unit = "N m" }', f'unit = "N m", scale = {scale} }}')
+    assert_refused(
+        stribeck("identify", copied, "-o", tmp_path / "out"),
+        1,
+        "torque reaches",
+        "which no rig does",
+        "scale",
+    )
+
+
+@pytest.mark.parametrize("command", ["demo", "design", "compare"])
+def test_help_shows_every_default(command: str) -> None:
+    shown = stribeck(command, "--help").stdout
+    assert "default: stribeck-out" in " ".join(shown.replace("│", " ").split())

@@ -13,7 +13,7 @@ import pytest
 from compensation.controller import Controller, Gains
 from compensation.sampled_loop import Sampling, run_sampled
 from ident.model.published import asymmetric_robot, symmetric_robot
-from pipelines.exit_status import UsageError
+from pipelines.exit_status import RefusalError, UsageError
 from pipelines.results.folder import Owner, ResultFolder
 from pipelines.simulate import (
     HEADER,
@@ -155,3 +155,17 @@ def test_what_a_sampled_loop_cannot_do() -> None:
         simulate_loop(
             symmetric_robot(), controller(), start=(1.0, 0.0, 0.0), duration=1e9, sampling=Sampling(0.001)
         )
+
+
+def test_a_controller_that_runs_away_is_refused_with_its_reason() -> None:
+    robot = symmetric_robot()
+    fast = Controller(Gains(0.004, 0.02, observer=1000.0, compensation=0.9), robot)
+    with pytest.raises(RefusalError, match=r"runs away .*L h = 10;.*Sample faster"):
+        simulate_loop(robot, fast, start=(0.6, 0, 0), duration=30.0, sampling=Sampling(1e-2))
+
+
+def test_gains_that_no_rig_has_are_not_blamed_on_the_duration() -> None:
+    robot = symmetric_robot()
+    stiff = Controller(Gains(1e300, 0.02, observer=73.5, compensation=1.0), robot)
+    with pytest.raises(RefusalError, match="Give gains that a rig can have"):
+        simulate_loop(robot, stiff, start=(1.0, 0, 0), duration=20.0)
