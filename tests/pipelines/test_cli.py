@@ -378,3 +378,17 @@ def test_a_torque_of_no_rig_is_refused(copied: Path, tmp_path: Path, scale: str)
 def test_help_shows_every_default(command: str) -> None:
     shown = stribeck(command, "--help").stdout
     assert "default: stribeck-out" in " ".join(shown.replace("│", " ").split())
+
+
+def test_what_was_salvaged_is_3_and_said(copied: Path, tmp_path: Path) -> None:
+    log = sorted((copied.parent / "breakaway").glob("*.mcap"))[0]
+    content = log.read_bytes()
+    log.unlink()
+    log.write_bytes(content[: int(0.8 * len(content))])
+    out = tmp_path / "out"
+    result = stribeck("identify", copied, "-o", out, "--salvage")
+    assert result.exit_code == 3, result.output
+    assert f"{log.name}: E-DAMAGE: salvaged" in result.stdout
+    document = json.loads((out / "robot.json").read_text(encoding="utf-8"))
+    (entry,) = [run for run in document["runs"] if run["log"].endswith(log.name)]
+    assert "salvaged" in entry["why"]

@@ -169,3 +169,13 @@ def test_gains_that_no_rig_has_are_not_blamed_on_the_duration() -> None:
     stiff = Controller(Gains(1e300, 0.02, observer=73.5, compensation=1.0), robot)
     with pytest.raises(RefusalError, match="Give gains that a rig can have"):
         simulate_loop(robot, stiff, start=(1.0, 0, 0), duration=20.0)
+
+
+def test_a_motion_that_decays_below_all_numbers_ends_at_the_set_point() -> None:
+    robot = symmetric_robot()
+    exact = Controller(Gains(0.4, 0.02, observer=73.5, compensation=1.0), robot)
+    run = simulate_loop(robot, exact, start=(1.0, 0.0, 0.0), duration=450.0)
+    assert run.time[-1] == 450.0
+    np.testing.assert_array_equal(run.state[-1], 0.0)
+    assert np.all(np.isfinite(run.state))
+    assert "decayed" in run.end
