@@ -24,7 +24,7 @@ from ident.simulation.compiled import compiled, inlined
 from ident.simulation.dormand_prince import DORMAND_PRINCE
 from ident.simulation.filippov_system import FloatArray, OneStepMethod, Signs, assign
 from ident.simulation.integrate import SECTION, WORK_ROWS, Progress, Record, Settings, integrate
-from ident.simulation.taylor import MAX_ORDER, TAYLOR
+from ident.simulation.taylor import ORDER, TAYLOR
 
 EVENT_STORE: Final = 256  # of a half turn: chattering beyond that is reported as no return
 STEP_LIMIT: Final = 200_000
@@ -114,8 +114,8 @@ def _derivative(
     )
     if end.reason != SECTION:
         return end.reason
-    polynomials = np.empty((y.size, MAX_ORDER + 1))
-    work = np.empty((WORK_ROWS, MAX_ORDER + 1))
+    polynomials = np.empty((y.size, ORDER + 1))
+    work = np.empty((WORK_ROWS, ORDER + 1))
     deviations = y[STATES:].reshape(DEVIATIONS, STATES)
     before, after = np.empty(STATES), np.empty(STATES)
     now = 0.0

@@ -10,7 +10,8 @@ from __future__ import annotations
 from math import exp, expm1
 from typing import Final
 
-from compensation.loop_modes import (
+from compensation.loop_modes import field
+from compensation.loop_parameters import (
     A1,
     A2,
     A3,
@@ -28,9 +29,8 @@ from compensation.loop_modes import (
     SIGNV,
     WIDTH2,
     WIDTHV,
-    field,
-    series,
 )
+from compensation.loop_series import series
 from ident.simulation.compiled import compiled, passed
 from ident.simulation.filippov_system import FilippovSystem, FloatArray, Signs, no_slide, no_slide_at
 
