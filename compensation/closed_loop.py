@@ -14,14 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.controller import Controller
 from compensation.loop_modes import MOTION
-from compensation.loop_parameters import COLUMNS, ROWS, mode_table
 from compensation.loop_runs import (
     EVENT_NAMES,
     begin,
@@ -30,7 +28,8 @@ from compensation.loop_runs import (
     run_dormand_prince,
     run_series,
 )
-from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
+from compensation.loop_tables import mode_parameters
+from ident.model.friction import ModelError
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
 from ident.simulation.integrate import END_REASONS, EVENTS_FULL, Progress
@@ -104,37 +103,6 @@ def torque(loop: ClosedLoop, states: ArrayLike) -> FloatArray:
     return feedback + gains.compensation * 0.5 * (low + high)
 
 
-@lru_cache(maxsize=1024)
-def mode_parameters(loop: ClosedLoop) -> FloatArray:
-    """The numbers of all modes, as `loop_modes` reads them: (6, 16), not to be written to."""
-    laws = np.array([*_rows(loop.robot.friction), *_rows(loop.controller.model.friction)])
-    inertia = np.array([loop.robot.inertia, loop.controller.model.inertia])
-    gains = loop.controller.gains
-    parameters = np.zeros((ROWS, COLUMNS))
-    mode_table(
-        laws,
-        inertia,
-        np.array([gains.proportional, gains.derivative, gains.observer, gains.compensation]),
-        parameters,
-    )
-    return parameters
-
-
-def _rows(friction: StribeckFriction) -> tuple[tuple[float, ...], ...]:
-    return tuple(_row(curve) for curve in (friction.positive, friction.negative))
-
-
-def _row(curve: StribeckCurve) -> tuple[float, ...]:
-    return (
-        curve.static_torque,
-        curve.coulomb_torque,
-        curve.stribeck_velocity,
-        curve.viscous_damping,
-        # without a Stribeck effect the shape is nobody's business: 1 keeps the mode analytic
-        curve.stribeck_shape if curve.stribeck_torque > 0.0 else 1.0,
-    )
-
-
 def _run(
     loop: ClosedLoop,
     state: FloatArray,
@@ -144,7 +112,7 @@ def _run(
     tolerance: float,
 ) -> tuple[Progress, Marks]:
     """Advance `state` to the end, in place; `states` at `times` on the way."""
-    parameters = mode_parameters(loop)
+    parameters = mode_parameters(loop.robot, loop.controller)
     run = run_series if is_analytic(parameters) else run_dormand_prince
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     begin(parameters, state, signs, contact)

@@ -96,10 +96,11 @@ def _derivative(
     method: OneStepMethod,
     parameters: FloatArray,
     tolerance: float,
+    tangent_tolerance: float,
     patience: float,
     state: FloatArray,
     out: FloatArray,
-) -> int:
+) -> tuple[float, int]:
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     begin(parameters, state, signs, contact)
     y = np.zeros(STATES * (1 + DEVIATIONS))
@@ -113,7 +114,7 @@ def _derivative(
         method, parameters, tolerance, patience, state, signs, contact, times, which, modes, states
     )
     if end.reason != SECTION:
-        return end.reason
+        return end.time, end.reason
     polynomials = np.empty((y.size, ORDER + 1))
     work = np.empty((WORK_ROWS, ORDER + 1))
     deviations = y[STATES:].reshape(DEVIATIONS, STATES)
@@ -124,7 +125,7 @@ def _derivative(
         if mode[MOTION] == 0:
             stick_deviations(deviations, mode[0], parameters, span)
         else:
-            carry(method, TANGENTS, parameters, mode, y, span, tolerance, polynomials, work)
+            carry(method, TANGENTS, parameters, mode, y, span, tangent_tolerance, polynomials, work)
         assign(y, states[event])
         normal = SURFACE_ROWS[which[event], :STATES]
         _rate(parameters, mode, states[event], before)
@@ -137,7 +138,7 @@ def _derivative(
         now = times[event]
     for i in range(DEVIATIONS):
         out[0, i], out[1, i] = deviations[i, 0], deviations[i, 1]
-    return SECTION
+    return end.time, SECTION
 
 
 @compiled
@@ -187,15 +188,28 @@ def returns_by_dormand_prince(
 
 @compiled
 def derivative_by_series(
-    parameters: FloatArray, tolerance: float, patience: float, state: FloatArray, out: FloatArray
-) -> int:
-    """Derivative (2, 2) of the half turn from the halt `state` (3,), which moves to the next halt; reason."""
-    return _derivative(TAYLOR, parameters, tolerance, patience, state, out)
+    parameters: FloatArray,
+    tolerance: float,
+    tangent_tolerance: float,
+    patience: float,
+    state: FloatArray,
+    out: FloatArray,
+) -> tuple[float, int]:
+    """Derivative (2, 2) of the half turn from the halt `state` (3,), which moves to the next halt.
+
+    Returns its duration [s] and why it ended. `tangent_tolerance` is that of the deviations' steps.
+    """
+    return _derivative(TAYLOR, parameters, tolerance, tangent_tolerance, patience, state, out)
 
 
 @compiled
 def derivative_by_dormand_prince(
-    parameters: FloatArray, tolerance: float, patience: float, state: FloatArray, out: FloatArray
-) -> int:
+    parameters: FloatArray,
+    tolerance: float,
+    tangent_tolerance: float,
+    patience: float,
+    state: FloatArray,
+    out: FloatArray,
+) -> tuple[float, int]:
     """As `derivative_by_series`, for any shape of the laws."""
-    return _derivative(DORMAND_PRINCE, parameters, tolerance, patience, state, out)
+    return _derivative(DORMAND_PRINCE, parameters, tolerance, tangent_tolerance, patience, state, out)
