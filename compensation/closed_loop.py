@@ -77,7 +77,7 @@ def simulate(
         points = min(GRID_LIMIT, max(2, math.ceil(duration * GRID_RATE)))
         wanted = np.union1d(np.linspace(0.0, duration, points + 1), marks.times)
     else:
-        wanted = _checked_times(times, duration)
+        wanted = checked_times(times, duration)
     states = np.empty((wanted.size, 3))
     end, marks = _run(loop, state, wanted, states, duration, tolerance)
     states[end.outputs :] = np.nan
@@ -166,7 +166,8 @@ def _checked_start(start: ArrayLike) -> FloatArray:
     return state
 
 
-def _checked_times(times: ArrayLike, duration: float) -> FloatArray:
+def checked_times(times: ArrayLike, duration: float) -> FloatArray:
+    """Times (k,) [s] that ascend within a duration [s]; ModelError otherwise."""
     wanted = np.array(times, dtype=np.float64)
     if wanted.ndim != 1 or not np.isfinite(wanted).all():
         raise ModelError("times are no list of finite numbers [s]")
