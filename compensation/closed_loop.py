@@ -12,24 +12,32 @@ smooth pieces: friction is set-valued, a stick is a stick, and its end is found 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.controller import Controller
-from compensation.loop_modes import COLUMNS, MOTION, ROWS, mode_table
-from compensation.loop_runs import begin, is_analytic, run_dormand_prince, run_series
-from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
+from compensation.loop_modes import MOTION
+from compensation.loop_runs import (
+    EVENT_NAMES,
+    begin,
+    is_analytic,
+    name_events,
+    run_dormand_prince,
+    run_series,
+)
+from compensation.loop_tables import mode_parameters
+from ident.model.friction import ModelError
 from ident.model.robot import OneLinkRobot
-from ident.simulation.filippov_system import FloatArray, Signs
+from ident.simulation.filippov_system import FloatArray
 from ident.simulation.integrate import END_REASONS, EVENTS_FULL, Progress
-from ident.simulation.trajectory import Event, Trajectory
+from ident.simulation.trajectory import Marks, Trajectory
 
 GRID_RATE = 200.0  # [1/s] of the times chosen where none are asked for
 GRID_LIMIT = 20_000
-EVENT_STORE = 1024
+EVENT_STORE = 256  # of one call; a run with more goes on in another
 STEP_LIMIT = 1_000_000
 
 
@@ -65,22 +73,21 @@ def simulate(
     if not 0 < tolerance < 1:
         raise ModelError(f"tolerance is {tolerance}: between 0 and 1, relative to the state")
     if times is None:
-        _, found = _run(loop, state, np.empty(0), np.empty((0, 3)), duration, tolerance)
+        _, marks = _run(loop, state.copy(), np.empty(0), np.empty((0, 3)), duration, tolerance)
         points = min(GRID_LIMIT, max(2, math.ceil(duration * GRID_RATE)))
-        grid = np.linspace(0.0, duration, points + 1)
-        wanted = np.union1d(grid, [event.time for event in found])
+        wanted = np.union1d(np.linspace(0.0, duration, points + 1), marks.times)
     else:
-        wanted = _checked_times(times, duration)
+        wanted = checked_times(times, duration)
     states = np.empty((wanted.size, 3))
-    end, events = _run(loop, state, wanted, states, duration, tolerance)
+    end, marks = _run(loop, state, wanted, states, duration, tolerance)
     states[end.outputs :] = np.nan
     return Trajectory(
         time=wanted,
         state=states,
-        events=tuple(events),
+        marks=marks,
         end_reason=END_REASONS[end.reason],
         end_time=end.time,
-        end_state=end.state,
+        end_state=state,
     )
 
 
@@ -96,64 +103,26 @@ def torque(loop: ClosedLoop, states: ArrayLike) -> FloatArray:
     return feedback + gains.compensation * 0.5 * (low + high)
 
 
-@lru_cache(maxsize=1024)
-def mode_parameters(loop: ClosedLoop) -> FloatArray:
-    """The numbers of all modes, as `loop_modes` reads them: (6, 16), not to be written to."""
-    laws = np.array([*_rows(loop.robot.friction), *_rows(loop.controller.model.friction)])
-    inertia = np.array([loop.robot.inertia, loop.controller.model.inertia])
-    gains = loop.controller.gains
-    parameters = np.zeros((ROWS, COLUMNS))
-    mode_table(
-        laws,
-        inertia,
-        np.array([gains.proportional, gains.derivative, gains.observer, gains.compensation]),
-        parameters,
-    )
-    return parameters
-
-
-def _rows(friction: StribeckFriction) -> tuple[tuple[float, ...], ...]:
-    return tuple(_row(curve) for curve in (friction.positive, friction.negative))
-
-
-def _row(curve: StribeckCurve) -> tuple[float, ...]:
-    return (
-        curve.static_torque,
-        curve.coulomb_torque,
-        curve.stribeck_velocity,
-        curve.viscous_damping,
-        # without a Stribeck effect the shape is nobody's business: 1 keeps the mode analytic
-        curve.stribeck_shape if curve.stribeck_torque > 0.0 else 1.0,
-    )
-
-
-@dataclass(frozen=True)
-class _End:
-    time: float  # [s]
-    reason: int  # index into END_REASONS
-    outputs: int  # wanted times that were reached
-    state: FloatArray  # (3,) [rad, rad/s, rad/s]
-
-
 def _run(
     loop: ClosedLoop,
-    start: FloatArray,
+    state: FloatArray,
     times: FloatArray,
     states: FloatArray,
     duration: float,
     tolerance: float,
-) -> tuple[_End, list[Event]]:
-    parameters = mode_parameters(loop)
+) -> tuple[Progress, Marks]:
+    """Advance `state` to the end, in place; `states` at `times` on the way."""
+    parameters = mode_parameters(loop.robot, loop.controller)
     run = run_series if is_analytic(parameters) else run_dormand_prince
-    state, signs, contact = start.copy(), np.empty(2, np.int64), np.empty(2, np.int64)
+    signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     begin(parameters, state, signs, contact)
-    events: list[Event] = []
-    moving = int(signs[MOTION])
+    parts: list[Marks] = []
     time, steps = 0.0, STEP_LIMIT
     while True:
-        store = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64), np.empty((EVENT_STORE, 2), np.int64)
-        at = np.empty((EVENT_STORE, 3))
-        progress: Progress = run(
+        moving = signs[MOTION]
+        at, which = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64)
+        modes, where = np.empty((EVENT_STORE, 2), np.int64), np.empty((EVENT_STORE, 3))
+        end: Progress = run(
             parameters,
             tolerance,
             duration,
@@ -167,45 +136,41 @@ def _run(
             contact,
             times,
             states,
-            *store,
             at,
+            which,
+            modes,
+            where,
         )
-        moving = _named(progress, store, at, moving, events)
-        time, steps = progress.time, steps - progress.steps
-        if progress.reason != EVENTS_FULL:
-            return _End(progress.time, progress.reason, progress.outputs, state), events
+        name_events(which[: end.events], modes, moving)
+        parts.append(Marks(at[: end.events], which[: end.events], where[: end.events], EVENT_NAMES))
+        time, steps = end.time, steps - end.steps
+        if end.reason != EVENTS_FULL:
+            return end, _joined(parts)
 
 
-def _named(
-    progress: Progress,
-    store: tuple[FloatArray, Signs, Signs],
-    states: FloatArray,
-    moving: int,
-    events: list[Event],
-) -> int:
-    """Append the events of one stretch; returns the sign of v after them."""
-    for i in range(progress.events):
-        after = int(store[2][i, MOTION])
-        if store[1][i] == MOTION or after != moving:
-            kind = "stick" if after == 0 else "slip" if moving == 0 else "velocity reversal"
-        else:
-            kind = "estimate reversal"
-        events.append(Event(time=float(store[0][i]), kind=kind, state=states[i].copy()))
-        moving = after
-    return moving
+def _joined(parts: Sequence[Marks]) -> Marks:
+    if len(parts) == 1:
+        return parts[0]
+    return Marks(
+        np.concatenate([part.times for part in parts]),
+        np.concatenate([part.kinds for part in parts]),
+        np.concatenate([part.states for part in parts]),
+        EVENT_NAMES,
+    )
 
 
 def _checked_start(start: ArrayLike) -> FloatArray:
     state = np.array(start, dtype=np.float64)
-    if state.shape != (3,) or not np.all(np.isfinite(state)):
+    if state.shape != (3,) or not all(map(math.isfinite, state.tolist())):
         raise ModelError(f"start is {start!r}: three finite numbers x1 [rad], x2 [rad/s], x3 [rad/s] (eq 8)")
     return state
 
 
-def _checked_times(times: ArrayLike, duration: float) -> FloatArray:
+def checked_times(times: ArrayLike, duration: float) -> FloatArray:
+    """Times (k,) [s] that ascend within a duration [s]; ModelError otherwise."""
     wanted = np.array(times, dtype=np.float64)
-    if wanted.ndim != 1 or not np.all(np.isfinite(wanted)):
+    if wanted.ndim != 1 or not np.isfinite(wanted).all():
         raise ModelError("times are no list of finite numbers [s]")
-    if wanted.size and (np.any(np.diff(wanted) < 0) or wanted[0] < 0 or wanted[-1] > duration):
+    if wanted.size and (wanted[0] < 0 or wanted[-1] > duration or (wanted[1:] < wanted[:-1]).any()):
         raise ModelError(f"times must ascend within 0 and the duration {duration:g} s")
     return wanted

@@ -25,10 +25,10 @@ from ident.simulation.dormand_prince import DORMAND_PRINCE
 from ident.simulation.filippov_system import FloatArray, OneStepMethod, Signs, assign
 from ident.simulation.integrate import SECTION, WORK_ROWS, Progress, Record, Settings, integrate
 from ident.simulation.integrate import STEP_LIMIT as STEPS_SPENT
-from ident.simulation.taylor import MAX_ORDER, TAYLOR
+from ident.simulation.taylor import ORDER, TAYLOR
 
 EVENT_STORE: Final = 256  # of a half turn: chattering beyond that is reported as no return
-STEP_LIMIT: Final = 200_000
+STEP_LIMIT: Final = 20_000  # of a half turn, which takes a hundred or so
 MOST_HALTS: Final = 1000  # in a turn: a link that halts more often is chattering, not turning
 
 
@@ -102,10 +102,11 @@ def _derivative(
     method: OneStepMethod,
     parameters: FloatArray,
     tolerance: float,
+    tangent_tolerance: float,
     patience: float,
     state: FloatArray,
     out: FloatArray,
-) -> int:
+) -> tuple[float, int]:
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     begin(parameters, state, signs, contact)
     y = np.zeros(STATES * (1 + DEVIATIONS))
@@ -119,9 +120,9 @@ def _derivative(
         method, parameters, tolerance, patience, state, signs, contact, times, which, modes, states
     )
     if end.reason != SECTION:
-        return end.reason
-    polynomials = np.empty((y.size, MAX_ORDER + 1))
-    work = np.empty((WORK_ROWS, MAX_ORDER + 1))
+        return end.time, end.reason
+    polynomials = np.empty((y.size, ORDER + 1))
+    work = np.empty((WORK_ROWS, ORDER + 1))
     deviations = y[STATES:].reshape(DEVIATIONS, STATES)
     before, after = np.empty(STATES), np.empty(STATES)
     now = 0.0
@@ -130,7 +131,7 @@ def _derivative(
         if mode[MOTION] == 0:
             stick_deviations(deviations, mode[0], parameters, span)
         else:
-            carry(method, TANGENTS, parameters, mode, y, span, tolerance, polynomials, work)
+            carry(method, TANGENTS, parameters, mode, y, span, tangent_tolerance, polynomials, work)
         assign(y, states[event])
         normal = SURFACE_ROWS[which[event], :STATES]
         _rate(parameters, mode, states[event], before)
@@ -143,7 +144,7 @@ def _derivative(
         now = times[event]
     for i in range(DEVIATIONS):
         out[0, i], out[1, i] = deviations[i, 0], deviations[i, 1]
-    return SECTION
+    return end.time, SECTION
 
 
 @compiled
@@ -193,15 +194,28 @@ def returns_by_dormand_prince(
 
 @compiled
 def derivative_by_series(
-    parameters: FloatArray, tolerance: float, patience: float, state: FloatArray, out: FloatArray
-) -> int:
-    """Derivative (2, 2) of the half turn from the halt `state` (3,), which moves to the next halt; reason."""
-    return _derivative(TAYLOR, parameters, tolerance, patience, state, out)
+    parameters: FloatArray,
+    tolerance: float,
+    tangent_tolerance: float,
+    patience: float,
+    state: FloatArray,
+    out: FloatArray,
+) -> tuple[float, int]:
+    """Derivative (2, 2) of the half turn from the halt `state` (3,), which moves to the next halt.
+
+    Returns its duration [s] and why it ended. `tangent_tolerance` is that of the deviations' steps.
+    """
+    return _derivative(TAYLOR, parameters, tolerance, tangent_tolerance, patience, state, out)
 
 
 @compiled
 def derivative_by_dormand_prince(
-    parameters: FloatArray, tolerance: float, patience: float, state: FloatArray, out: FloatArray
-) -> int:
+    parameters: FloatArray,
+    tolerance: float,
+    tangent_tolerance: float,
+    patience: float,
+    state: FloatArray,
+    out: FloatArray,
+) -> tuple[float, int]:
     """As `derivative_by_series`, for any shape of the laws."""
-    return _derivative(DORMAND_PRINCE, parameters, tolerance, patience, state, out)
+    return _derivative(DORMAND_PRINCE, parameters, tolerance, tangent_tolerance, patience, state, out)

@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from compensation.loop_modes import SHAPE2, SHAPEV, SYSTEM, surfaces
+from compensation.loop_modes import MOTION, SYSTEM, surfaces
+from compensation.loop_parameters import SHAPE2, SHAPEV
 from ident.simulation.compiled import compiled
 from ident.simulation.dormand_prince import DORMAND_PRINCE
 from ident.simulation.filippov_system import FloatArray, Signs, resolve, switching_value
@@ -17,6 +18,7 @@ from ident.simulation.integrate import Progress, Record, Settings, integrate
 from ident.simulation.taylor import TAYLOR
 
 SLIP_MODES: Final = 4
+EVENT_NAMES: Final = ("stick", "slip", "velocity reversal", "estimate reversal")
 
 
 @compiled
@@ -50,6 +52,21 @@ def begin(parameters: FloatArray, state: FloatArray, signs: Signs, contact: Sign
         if switching_value(on, i, state) == 0.0:
             contact[i] = 1
             signs[i] = resolve(SYSTEM, on, i, signs, state, parameters, rate)
+
+
+@compiled
+def name_events(surfaces_met: Signs, modes: Signs, moving: int) -> None:
+    """Turn the surfaces (e,) that were met into indices of EVENT_NAMES, in place.
+
+    `modes` (e or more, 2) are those after the events, `moving` is the sign of v before the first.
+    """
+    for i in range(surfaces_met.size):
+        after = modes[i, MOTION]
+        if surfaces_met[i] == MOTION or after != moving:
+            surfaces_met[i] = 0 if after == 0 else 1 if moving == 0 else 2
+        else:
+            surfaces_met[i] = 3
+        moving = after
 
 
 @compiled

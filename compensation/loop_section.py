@@ -8,7 +8,7 @@ from typing import Final
 
 import numpy as np
 
-from compensation.closed_loop import ClosedLoop, mode_parameters
+from compensation.closed_loop import ClosedLoop
 from compensation.loop_returns import (
     MOST_HALTS,
     derivative_by_dormand_prince,
@@ -17,6 +17,7 @@ from compensation.loop_returns import (
     returns_by_series,
 )
 from compensation.loop_runs import is_analytic
+from compensation.loop_tables import mode_parameters
 from compensation.orbits.periodic_orbits import Returns
 from ident.model.friction import StribeckFriction
 from ident.model.robot import OneLinkRobot
@@ -41,15 +42,16 @@ class LoopSection:
 
     @cached_property
     def _parameters(self) -> FloatArray:
-        return mode_parameters(self.loop)
+        return mode_parameters(self.loop.robot, self.loop.controller)
 
     @cached_property
-    def _analytic(self) -> bool:
+    def by_series(self) -> bool:
+        """Whether the modes have Taylor series."""
         return is_analytic(self._parameters)
 
     @property
     def _tolerance(self) -> float:
-        return TOLERANCE if self._analytic else TOLERANCE_ELSE
+        return TOLERANCE if self.by_series else TOLERANCE_ELSE
 
     def follow(self, point: FloatArray, returns: int) -> Returns:
         """The next returns after a point (2,) of the section."""
@@ -58,7 +60,7 @@ class LoopSection:
     def follow_state(self, state: FloatArray, count: int) -> Returns:
         """The next returns after any state (3,)."""
         rows = np.empty((count, 5))
-        kernel = returns_by_series if self._analytic else returns_by_dormand_prince
+        kernel = returns_by_series if self.by_series else returns_by_dormand_prince
         made, reason = kernel(self._parameters, self.symmetric, self._tolerance, PATIENCE, state, rows)
         rows = rows[:made]
         return Returns(rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], END_REASONS[reason])
@@ -70,8 +72,8 @@ class LoopSection:
         for _ in range(MOST_HALTS):
             before = state[0]
             once = np.empty((2, 2))
-            kernel = derivative_by_series if self._analytic else derivative_by_dormand_prince
-            reason = kernel(self._parameters, self._tolerance, PATIENCE, state, once)
+            kernel = derivative_by_series if self.by_series else derivative_by_dormand_prince
+            _, reason = kernel(self._parameters, self._tolerance, self._tolerance, PATIENCE, state, once)
             if reason != SECTION:
                 return None
             slope = once @ slope

@@ -10,7 +10,10 @@ from __future__ import annotations
 from math import exp, expm1
 from typing import Final
 
-from compensation.loop_modes import (
+import numpy as np
+
+from compensation.loop_modes import field
+from compensation.loop_parameters import (
     A1,
     A2,
     A3,
@@ -28,9 +31,8 @@ from compensation.loop_modes import (
     SIGNV,
     WIDTH2,
     WIDTHV,
-    field,
-    series,
 )
+from compensation.loop_series import series
 from ident.simulation.compiled import compiled, passed
 from ident.simulation.filippov_system import FilippovSystem, FloatArray, Signs, no_slide, no_slide_at
 
@@ -83,7 +85,10 @@ def tangent_series(
     """Taylor coefficients of the state and of two deviations into rows 0..8, all shapes 1."""
     reach = series(signs, state[:STATES], parameters, order, coefficients, work)
     k = parameters[(2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)]
+    a1, a2, a3, k2, kv = k[A1], k[A2], k[A3], k[K2], k[KV]
+    c1, c2, gain = k[C1], k[C2], k[GAIN]
     alike = k[ALIKE] != 0.0
+    shared = 1.0 if alike else 0.0
     d2, d3, dv, e, w = work[0], work[1], work[2], work[3], work[4]
     rate2, ratev = -k[SIGN2] / k[WIDTH2], -k[SIGNV] / k[WIDTHV]
     for d in range(1, 1 + DEVIATIONS):
@@ -99,21 +104,25 @@ def tangent_series(
             tw[0] = ratev * w[0] * (p2[0] + p3[0])
         for i in range(order):
             step = 1.0 / (i + 1)
-            two = k[C1] * p1[i] + k[C2] * p2[i] + k[GAIN] * p3[i]
-            three = k[A1] * p1[i] + k[A2] * p2[i] + k[A3] * p3[i] + k[K2] * te[i] + k[KV] * tw[i]
+            two = c1 * p1[i] + c2 * p2[i] + gain * p3[i]
+            three = a1 * p1[i] + a2 * p2[i] + a3 * p3[i] + k2 * te[i] + kv * tw[i]
             t2[i], t3[i], tv[i] = two, three, two + three
             p1[i + 1] = (p2[i] + p3[i]) * step
             p2[i + 1] = two * step
             p3[i + 1] = three * step
-            fade, slide = 0.0, 0.0
-            for j in range(i + 1):
-                fade += t2[j] * e[i - j] + d2[j] * te[i - j]
-                slide += tv[j] * w[i - j] + dv[j] * tw[i - j]
-            if alike:
-                for j in range(i + 1):
-                    slide += t3[j] * e[i - j] + d3[j] * te[i - j]
-            te[i + 1] = rate2 * fade * step
-            tw[i + 1] = ratev * slide * step
+            fade, fade_base = 0.0, 0.0  # every sum is a chain of its own: they do not wait for each other
+            slide, slide_base = 0.0, 0.0
+            share, share_base = 0.0, 0.0
+            for ahead in range(i + 1):
+                j, back = np.uint64(ahead), np.uint64(i - ahead)
+                fade += t2[j] * e[back]
+                slide += tv[j] * w[back]
+                share += t3[j] * e[back]
+                fade_base += d2[j] * te[back]
+                slide_base += dv[j] * tw[back]
+                share_base += d3[j] * te[back]
+            te[i + 1] = rate2 * step * (fade + fade_base)
+            tw[i + 1] = ratev * step * ((slide + slide_base) + shared * (share + share_base))
     return reach
 
 

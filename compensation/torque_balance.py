@@ -12,9 +12,7 @@ is not positive. This file finds all s > 0 with h(s) <= 0, as intervals.
 Written with h(0+) = r F_s^ - F_s, h(s) = a s + h(0+) + r dF^ expm1(-(s / v_s^)^beta): near the critical gain
 the set shrinks to 0, and this form loses nothing there.
 
-* beta = 1: h is convex; with c = F_s - r F_c^ its roots are s = c/a + v_s W(-K e^{-c/(a v_s)}), K = r dF^/(a
-  v_s), the principal branch of Lambert's W for the outer edge, branch -1 for the inner. The argument under-
-  and overflows long before the roots do, so W is taken in logarithmic form.
+* beta = 1: h is convex, its roots are closed form (`lambert_roots`).
 * beta < 1: h is convex too, infinitely steep at 0: at most two roots, apart by its only minimum.
 * beta > 1: g^ bends at s_i = v_s ((beta - 1)/beta)^(1/beta), so h' falls until s_i and rises after: at most
   two stationary points, one on each side of s_i, and at most three roots between and around them.
@@ -30,6 +28,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from scipy.optimize import brentq
+
+from compensation.lambert_roots import lambert_roots
 
 Interval = tuple[float, float]  # ends of a range of s [rad/s]; the upper may be infinite
 _FAR = 1e60  # s/v_s beyond which everything has faded, for any shape; keeps the power finite
@@ -94,32 +94,8 @@ class TorqueBalance:
 
     def _roots_by_lambert(self, end: float) -> list[float]:
         """The closed form for beta = 1, each root refined on h itself."""
-        steepness = self.fading / (self.slope * self.stribeck_velocity)  # K
-        exponent = end / self.stribeck_velocity - math.log(steepness)
-        if exponent < 1.0:  # the minimum of h is positive
-            return []
-        outer, inner = (end - self.stribeck_velocity * w for w in minus_lambert(exponent))
-        if self.onset < 0.0:
-            candidates = [outer]
-        elif steepness <= 1.0:  # h rises from 0 on
-            candidates = []
-        else:
-            candidates = [inner, outer] if self.onset > 0.0 else [outer]  # at h(0+) = 0 the inner root is 0
-        return [self._refined(root) for root in candidates if root > 0.0]
-
-    def _refined(self, root: float) -> float:
-        """Two Newton steps, each kept only if it lowers |h|."""
-        for _ in range(2):
-            value = self.excess(root)
-            fading = self.fading * math.exp(-root / self.stribeck_velocity)
-            gradient = self.slope - fading / self.stribeck_velocity
-            if value == 0.0 or gradient == 0.0:
-                break
-            better = root - value / gradient
-            if not better > 0.0 or abs(self.excess(better)) >= abs(value):
-                break
-            root = better
-        return root
+        inner, outer = lambert_roots(self.slope, self.onset, self.fading, self.stribeck_velocity, end)
+        return [root for root in (inner, outer) if root > 0.0]
 
     def _root_between(self, low: float, high: float) -> float | None:
         """The root of h in a piece where h is monotone, or None."""
@@ -138,7 +114,7 @@ class TorqueBalance:
         """
         beta = self.stribeck_shape
         bend = (beta - 1.0) / beta
-        level = math.log(self.fading * beta / (self.slope * self.stribeck_velocity))
+        level = math.log(self.fading) + math.log(beta / (self.slope * self.stribeck_velocity))
 
         def steepness(p: float) -> float:
             return level + bend * p - math.exp(p)
@@ -154,32 +130,6 @@ class TorqueBalance:
             near = min(-level / bend, inflection) - 1.0
             roots = [_bracketed(steepness, near, inflection), _bracketed(steepness, inflection, far)]
         return [self.stribeck_velocity * math.exp(p / beta) for p in roots]
-
-
-def minus_lambert(exponent: float) -> tuple[float, float]:
-    """-W_0(-e^-u) and -W_-1(-e^-u), u = `exponent` >= 1: the w <= 1 and w >= 1 with w - ln w = u.
-
-    With w = e^-t the equation is t + e^-t = u: t >= 0 is the principal branch, t <= 0 branch -1. The left
-    side is convex, so Newton's method from outside converges from one side, and no exponent is too large.
-    """
-    if exponent <= 1.0:
-        return 1.0, 1.0
-    logarithm = -math.log(exponent + 2.0 * math.sqrt(exponent))  # -t is below ln(u + 2 sqrt(u))
-    return math.exp(-_newton_from_outside(exponent, exponent)), math.exp(
-        -_newton_from_outside(logarithm, exponent)
-    )
-
-
-def _newton_from_outside(t: float, exponent: float) -> float:
-    for _ in range(100):
-        fading = math.exp(-t)
-        if fading == 1.0:
-            break
-        step = (t + fading - exponent) / (1.0 - fading)
-        t -= step
-        if abs(step) <= 4e-16 * (1.0 + abs(t)):
-            break
-    return t
 
 
 def _bracketed(function: Callable[[float], float], low: float, high: float) -> float:

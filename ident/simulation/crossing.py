@@ -1,10 +1,10 @@
 """The first zero of a polynomial on (0, 1], to rounding: where a step leaves its mode.
 
 A step of an integrator is a polynomial p(theta), theta in [0, 1], and so is every switching function
-along it. Most steps meet no surface, which one sum of absolute values proves. Otherwise the interval is
-cut until a part either holds no zero, by that bound, or is monotone, by the same bound on the
-derivative; a safeguarded Newton iteration then ends at rounding. No zero is passed over, a double zero
-(a graze) included.
+along it. Most steps meet no surface, which one sum of absolute values proves, or the same sum beside a
+parabola. Otherwise the interval is cut until a part either holds no zero, by that bound, or is
+monotone, by the same bound on the derivative; a safeguarded Newton iteration then ends at rounding. No
+zero is passed over, a double zero (a graze) included.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ def first_crossing(polynomial: FloatArray, degree: int, sign: int, contact: int,
     lead = sign * polynomial[contact]
     if lead > rest:
         return inf
+    if last >= 2 and _parabola_is_clear(lead, sign, polynomial[contact:], rest):
+        return inf
     for k in range(last + 1):
         work[k] = sign * polynomial[k + contact]
     if lead <= 0.0:
@@ -40,6 +42,16 @@ def first_crossing(polynomial: FloatArray, degree: int, sign: int, contact: int,
             return 0.0
         work[0] = 0.0  # on which side the state leaves was decided before
     return _isolate(work, last)
+
+
+@compiled
+def _parabola_is_clear(lead: float, sign: int, q: FloatArray, rest: float) -> bool:
+    """Whether the first three terms stay above what the others can take away, on all of [0, 1]."""
+    slope, bend = sign * q[1], sign * q[2]
+    least = min(lead, lead + slope + bend)
+    if slope < 0.0 and 0.0 < -slope < 2.0 * bend:
+        least = lead - 0.25 * slope * slope / bend
+    return bool(least > (1.0 + ROUNDING) * (rest - abs(slope) - abs(bend)) + ROUNDING * rest)
 
 
 @compiled
@@ -116,8 +128,10 @@ def _root(q: FloatArray, degree: int, width: float) -> float:
 def _shift(q: FloatArray, degree: int, by: float) -> None:
     """q(x) becomes q(x + by): repeated synthetic division."""
     for i in range(degree):
+        value = q[degree]
         for k in range(degree - 1, i - 1, -1):
-            q[k] += by * q[k + 1]
+            value = q[k] + by * value
+            q[k] = value
 
 
 @compiled

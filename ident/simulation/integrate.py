@@ -33,7 +33,7 @@ from ident.simulation.filippov_system import (
     resolve,
     switching_value,
 )
-from ident.simulation.taylor import MAX_ORDER
+from ident.simulation.taylor import ORDER
 
 TIME_REACHED: Final = 0
 EQUILIBRIUM: Final = 1
@@ -111,9 +111,9 @@ def integrate(
     once, with its later outputs filled in; `state` is then where it tends to.
     """
     n, m = state.size, signs.size
-    polynomials = np.empty((n + m, MAX_ORDER + 1))
-    work = np.empty((WORK_ROWS, max(n, MAX_ORDER + 1)))
-    after, rate = np.empty(n), np.empty(n)
+    polynomials = np.empty((n + m, ORDER + 1))
+    work = np.empty((WORK_ROWS, max(n, ORDER + 1)))
+    after, rate, spread = np.empty(n), np.empty(n), np.empty(n)
     wanted = record.times.size
     output = 0
     while output < wanted and record.times[output] < time:
@@ -156,11 +156,14 @@ def integrate(
             length, degree, suggested = method.step(
                 system, signs, state, parameters, settings.tolerance, left, suggested, polynomials, work
             )
-            if not _finite(polynomials, n, degree):
+            _sum_up(polynomials, n, degree, after, spread)
+            if not _finite(spread):
                 return Progress(time, NOT_FINITE, output, events, step)
-            _switching_polynomials(surfaces, n, degree, polynomials)
             part = 1.0
             for i in range(m):
+                if contact[i] == 0 and _is_clear(surfaces, i, signs[i], state, spread):
+                    continue
+                _switching_polynomial(surfaces, i, n, degree, polynomials)
                 at = first_crossing(polynomials[n + i], degree, signs[i], contact[i], work[0])
                 if at <= part and (surface < 0 or at < part):
                     part = at
@@ -175,7 +178,8 @@ def integrate(
                 inside = min((record.times[output] - time) / length, part)
                 evaluate(polynomials, n, degree, inside, record.states[output])
                 output += 1
-            evaluate(polynomials, n, degree, part, after)
+            if surface >= 0:
+                evaluate(polynomials, n, degree, part, after)
             stalled = stalled + 1 if now == time else 0
             time = now
             assign(state, after)
@@ -213,11 +217,33 @@ def _slides(signs: Signs) -> bool:
 
 
 @compiled
-def _finite(polynomials: FloatArray, n: int, degree: int) -> bool:
-    total = 0.0
+def _sum_up(polynomials: FloatArray, n: int, degree: int, end: FloatArray, spread: FloatArray) -> None:
+    """Values (n,) at the end of a step, and the furthest (n,) that they can be from its beginning."""
     for i in range(n):
-        total += abs(polynomials[i, degree]) + abs(polynomials[i, 1])
+        row = polynomials[i]
+        value, bound = 0.0, 0.0
+        for k in range(degree, 0, -1):
+            value += row[k]
+            bound += abs(row[k])
+        end[i] = value + row[0]
+        spread[i] = bound
+
+
+@compiled
+def _finite(spread: FloatArray) -> bool:
+    total = 0.0
+    for i in range(spread.size):
+        total += spread[i]
     return bool(np.isfinite(total))
+
+
+@specialised
+def _is_clear(surfaces: Surfaces, index: int, sign: int, state: FloatArray, spread: FloatArray) -> bool:
+    """Whether a step cannot meet the surface: the one test that most steps need."""
+    reach = 0.0
+    for j in range(state.size):
+        reach += abs(surfaces.rows[index, j]) * spread[j]
+    return bool(sign * switching_value(surfaces, index, state) > reach)
 
 
 @specialised
@@ -243,18 +269,19 @@ def _hold(
 
 
 @specialised
-def _switching_polynomials(surfaces: Surfaces, n: int, degree: int, polynomials: FloatArray) -> None:
-    """Switching functions along a step into the rows after the states."""
-    for i in range(surfaces.pivots.size):
-        row = polynomials[n + i]
-        for k in range(1, degree + 1):
-            row[k] = 0.0
-        row[0] = surfaces.rows[i, n]
-        for j in range(n):
-            factor = surfaces.rows[i, j]
-            if factor != 0.0:
-                for k in range(degree + 1):
-                    row[k] += factor * polynomials[j, k]
+def _switching_polynomial(
+    surfaces: Surfaces, index: int, n: int, degree: int, polynomials: FloatArray
+) -> None:
+    """A switching function along a step, into its row after the states."""
+    row = polynomials[n + index]
+    for k in range(1, degree + 1):
+        row[k] = 0.0
+    row[0] = surfaces.rows[index, n]
+    for j in range(n):
+        factor = surfaces.rows[index, j]
+        if factor != 0.0:
+            for k in range(degree + 1):
+                row[k] += factor * polynomials[j, k]
 
 
 @specialised

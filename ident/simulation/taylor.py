@@ -2,24 +2,23 @@
 
 The series itself is the dense output, and events are zeros of polynomials. The step follows Jorba and
 Zou (2005): with the coefficients c_k of a series of order p, h is the smaller of (tol |y| /
-|c_k|)^(1/k) over the last two k, so that the terms left out stay below tol |y|. Tight tolerances ask
-for a high order rather than for short steps: about -ln(tol)/2 + 4 costs least here.
+|c_k|)^(1/k) over the last two k, so that the terms left out stay below tol |y|.
+
+The order is the same for every tolerance. A component that decays at a rate mu bounds the step by the
+stability of the truncated series, mu h < p/e about, however loose the tolerance is: a high order serves stiff
+modes at loose tolerances as it serves tight ones.
 """
 
 from __future__ import annotations
 
-import math
+from math import exp, log
+from typing import Final
 
-from ident.simulation.compiled import compiled, passed, specialised
+from ident.simulation.compiled import passed, specialised
 from ident.simulation.filippov_system import FilippovSystem, FloatArray, OneStepMethod, Signs, Surfaces
 
-MAX_ORDER = 24
-
-
-@compiled
-def order_for(tolerance: float) -> int:
-    """Order of the series that reaches a tolerance at least cost."""
-    return min(MAX_ORDER, max(8, math.ceil(-0.5 * math.log(tolerance) + 4.0)))
+ORDER: Final = 20
+SMALLEST: Final = 1e-300  # stands for a coefficient that vanishes
 
 
 @specialised
@@ -40,8 +39,7 @@ def taylor_step(
     exactly that length is taken.
     """
     n = state.size
-    order = order_for(tolerance)
-    reach = system.series(signs, state, parameters, order, polynomials, work)
+    reach = system.series(signs, state, parameters, ORDER, polynomials, work)
     if longest < 0.0:
         length = -longest
     else:
@@ -50,21 +48,21 @@ def taylor_step(
         before = 0.0
         for i in range(n):
             size = max(size, abs(state[i]))
-            last = max(last, abs(polynomials[i, order]))
-            before = max(before, abs(polynomials[i, order - 1]))
-        length = min(longest, reach)
-        if last > 0.0:
-            length = min(length, (tolerance * size / last) ** (1.0 / order))
-        if before > 0.0:
-            length = min(length, (tolerance * size / before) ** (1.0 / (order - 1)))
-        if size == 0.0:
-            length = min(length, 1e-3 / (1.0 + abs(last) ** (1.0 / order)))
-    for i in range(n):
-        power = 1.0
-        for k in range(1, order + 1):
-            power *= length
+            last = max(last, abs(polynomials[i, ORDER]))
+            before = max(before, abs(polynomials[i, ORDER - 1]))
+        if size > 0.0:
+            allowed = tolerance * size
+            by_last = log(allowed / max(last, SMALLEST)) / ORDER
+            by_before = log(allowed / max(before, SMALLEST)) / (ORDER - 1)
+            length = min(longest, reach, exp(min(by_last, by_before)))
+        else:
+            length = min(longest, reach, 1e-3 / (1.0 + last ** (1.0 / ORDER)))
+    power = 1.0
+    for k in range(1, ORDER + 1):
+        power *= length
+        for i in range(n):
             polynomials[i, k] *= power
-    return length, order, suggested
+    return length, ORDER, suggested
 
 
 @specialised

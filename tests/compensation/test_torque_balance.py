@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.special import lambertw
 
-from compensation.torque_balance import TorqueBalance, minus_lambert
+from compensation.lambert_roots import minus_lambert
+from compensation.torque_balance import TorqueBalance
 
 balances = st.builds(
     TorqueBalance,

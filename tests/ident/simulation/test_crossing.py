@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ident.simulation.crossing import first_crossing
@@ -18,6 +18,7 @@ def crossing(roots: list[float], sign: int = 1, contact: int = 0) -> float:
     return first_crossing(polynomial, polynomial.size - 1, sign, contact, np.empty(polynomial.size))
 
 
+@settings(deadline=None)  # the first example may compile
 @given(
     st.lists(st.floats(0.02, 3.0), min_size=1, max_size=6).filter(
         lambda roots: all(abs(a - b) > 0.02 for i, a in enumerate(roots) for b in roots[:i])
@@ -31,6 +32,7 @@ def test_the_first_of_simple_roots_is_found(roots: list[float], sign: int) -> No
         assert crossing(roots, sign) == pytest.approx(expected, abs=1e-9)
 
 
+@settings(deadline=None)  # the first example may compile
 @given(st.floats(0.1, 0.9), st.floats(1e-12, 1e-3))
 def test_a_graze_that_misses_is_no_crossing_and_one_that_dips_is(at: float, depth: float) -> None:
     missed = np.array([at * at + depth, -2 * at, 1.0])

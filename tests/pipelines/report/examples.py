@@ -10,7 +10,7 @@ from compensation.bifurcation import Bifurcation, Branch, Diagram, Point
 from compensation.controller import Gains
 from ident.friction_map import MapPoint
 from ident.model import published
-from ident.simulation.trajectory import Trajectory
+from ident.simulation.trajectory import Marks, Trajectory
 
 HOSTILE: Final = "<script>alert(1)</script>&\"'=cmd()\x1b[31m\u202e$x_1${{ 7 * 7 }}-->"
 
@@ -42,7 +42,8 @@ def motion() -> Trajectory:
     """A decaying oscillation."""
     time = np.linspace(0.0, 5.0, 200)
     state = np.exp(-time)[:, None] * np.column_stack((np.cos(3 * time), -np.sin(3 * time), 0.1 * time))
-    return Trajectory(time, state, (), "time reached", 5.0, state[-1])
+    none = Marks(np.empty(0), np.empty(0, np.int64), np.empty((0, 3)), ())
+    return Trajectory(time, state, none, "time reached", 5.0, state[-1])
 
 
 def diagram() -> Diagram:

@@ -1,0 +1,126 @@
+"""Many trajectories of the closed loop at once: arrays of starts and gains, on all cores.
+
+Neighbouring trajectories cost alike, and their cost changes along a sorted gain: part p of P takes every P-th
+from the p-th on, so that all parts end together. A part is one compiled call that releases the interpreter
+lock: threads are enough. Which threads is the caller's business, by `map_parts`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Final, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from compensation.closed_loop import STEP_LIMIT, ClosedLoop, checked_times
+from compensation.loop_runs import begin, is_analytic, run_dormand_prince, run_series
+from compensation.loop_tables import gain_row, tables_over_gains
+from ident.model.friction import ModelError
+from ident.simulation.compiled import compiled
+from ident.simulation.filippov_system import FloatArray, Signs
+from ident.simulation.integrate import END_REASONS
+
+STATES: Final = 3
+
+
+class MapParts(Protocol):
+    """`map`, or what stands in for it on several threads."""
+
+    def __call__(self, function: Callable[[int], None], parts: Iterable[int], /) -> Iterable[None]:
+        """Apply a function to every part."""
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """Where n trajectories went."""
+
+    time: FloatArray  # (k,) [s]
+    state: FloatArray  # (n, k, 3) x1 [rad], x2 [rad/s], x3 [rad/s]; nan after a trajectory that broke off
+    reasons: Signs  # (n,) indices into END_REASONS
+    end_time: FloatArray  # (n,) [s] of an equilibrium: since when the link rests
+    end_state: FloatArray  # (n, 3) [rad, rad/s, rad/s]; of an equilibrium: where the state tends to
+
+    @property
+    def end_reasons(self) -> tuple[str, ...]:
+        """Why each ended: "time reached", "equilibrium" or "step limit"."""
+        return tuple(END_REASONS[reason] for reason in self.reasons.tolist())
+
+
+def simulate_many(
+    loop: ClosedLoop,
+    starts: ArrayLike,
+    *,
+    duration: float,
+    times: ArrayLike = (),
+    gains: ArrayLike | None = None,
+    tolerance: float = 1e-10,
+    map_parts: MapParts = map,
+    parts: int = 1,
+) -> Trajectories:
+    """Solve inclusion (8) from each of `starts` (n, 3) [rad, rad/s, rad/s] for `duration` [s].
+
+    `gains` (n, 4) are n1 [N m/rad], n2 [N m s/rad], L [1/s] and r [-] of each trajectory, else the loop's.
+    States are given at `times` (k,) [s]. The work is cut into `parts`, which `map_parts` applies.
+
+    Raises
+    ------
+    ModelError
+        If starts, gains, times or tolerance are no numbers, have no fitting shape or run backwards.
+    """
+    first = np.array(starts, dtype=np.float64)
+    if first.ndim != 2 or first.shape[1] != STATES or not np.isfinite(first).all():
+        raise ModelError(f"starts of shape {first.shape}: finite numbers of shape (n, 3) are needed (eq 8)")
+    rows = np.asarray(gain_row(loop.controller)[np.newaxis] if gains is None else gains, dtype=np.float64)
+    if rows.ndim != 2 or rows.shape[1] != 4 or (gains is not None and rows.shape[0] != first.shape[0]):
+        raise ModelError(f"gains of shape {rows.shape}: n1, n2, L, r for each of {first.shape[0]} starts")
+    if not (np.isfinite(rows).all() and (rows >= 0.0).all() and (rows[:, 0] > 0.0).all()):
+        raise ModelError("gains must be finite, n1 > 0 and the others >= 0 (eqs 5-7)")
+    if not (0 < duration < np.inf and 0 < tolerance < 1):
+        raise ModelError(f"duration {duration} s, tolerance {tolerance}: positive, the tolerance below 1")
+    tables = tables_over_gains(loop.robot, loop.controller, rows)
+    wanted = checked_times(times, duration)
+    count = first.shape[0]
+    states = np.full((count, wanted.size, STATES), np.nan)
+    end_times, reasons = np.empty(count), np.empty(count, np.int64)
+
+    def run_part(part: int) -> None:
+        run_every(tables, part, parts, tolerance, duration, first, wanted, states, end_times, reasons)
+
+    for _ in map_parts(run_part, range(parts)):
+        pass
+    return Trajectories(wanted, states, reasons, end_times, first)
+
+
+@compiled
+def run_every(
+    tables: FloatArray,
+    part: int,
+    parts: int,
+    tolerance: float,
+    duration: float,
+    starts: FloatArray,
+    times: FloatArray,
+    states: FloatArray,
+    end_times: FloatArray,
+    reasons: Signs,
+) -> None:
+    """Trajectories `part`, `part` + `parts`, ...; `starts` become their ends."""
+    signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
+    at, which = np.empty(0), np.empty(0, np.int64)
+    modes, where = np.empty((0, 2), np.int64), np.empty((0, STATES))
+    for i in range(part, starts.shape[0], parts):
+        table = tables[min(i, tables.shape[0] - 1)]
+        begin(table, starts[i], signs, contact)
+        if is_analytic(table):
+            end = run_series(
+                table, tolerance, duration, STEP_LIMIT, -1, 0, 0, 0.0, starts[i], signs, contact,
+                times, states[i], at, which, modes, where,
+            )  # fmt: skip
+        else:
+            end = run_dormand_prince(
+                table, tolerance, duration, STEP_LIMIT, -1, 0, 0, 0.0, starts[i], signs, contact,
+                times, states[i], at, which, modes, where,
+            )  # fmt: skip
+        end_times[i], reasons[i] = end.time, end.reason

@@ -1,0 +1,56 @@
+"""Many trajectories at once are the single ones, in any number of parts and on any map."""
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from compensation.closed_loop import ClosedLoop, simulate
+from compensation.controller import Controller, Gains
+from compensation.loop_section import with_gain
+from compensation.many_trajectories import simulate_many
+from ident.model.friction import ModelError, StribeckFriction
+from ident.model.published import symmetric_robot
+
+GAINS = Gains(proportional=0.4, derivative=0.02, observer=73.5, compensation=1.1)
+LOOP = ClosedLoop(symmetric_robot(), Controller(GAINS, symmetric_robot()))
+R = np.linspace(0.8, 1.2, 7)
+ROWS = np.column_stack([np.full(7, 0.4), np.full(7, 0.02), np.full(7, 73.5), R])
+STARTS = np.column_stack([np.linspace(1.0, -0.5, 7), np.linspace(0.0, 0.3, 7), np.zeros(7)])
+TIMES = np.linspace(0.0, 5.0, 11)
+
+
+@pytest.mark.parametrize("parts", [1, 2, 3])
+def test_parts_do_not_matter(parts: int) -> None:
+    with ThreadPoolExecutor(2) as threads:
+        many = simulate_many(
+            LOOP, STARTS, duration=5.0, times=TIMES, gains=ROWS, map_parts=threads.map, parts=parts
+        )
+    for i, r in enumerate(R):
+        alone = simulate(with_gain(LOOP, "r", float(r)), STARTS[i], duration=5.0, times=TIMES)
+        np.testing.assert_array_equal(many.state[i], alone.state)
+        np.testing.assert_array_equal(many.end_state[i], alone.end_state)
+        assert many.end_reasons[i] == alone.end_reason
+        assert many.end_time[i] == alone.end_time
+
+
+def test_one_controller_and_another_shape() -> None:
+    curve = replace(symmetric_robot().friction.positive, stribeck_shape=1.5)
+    robot = replace(symmetric_robot(), friction=StribeckFriction.symmetric(curve))
+    loop = ClosedLoop(robot, Controller(GAINS, robot))
+    many = simulate_many(loop, STARTS, duration=2.0)
+    assert many.state.shape == (7, 0, 3)
+    alone = simulate(loop, STARTS[3], duration=2.0, times=())
+    np.testing.assert_array_equal(many.end_state[3], alone.end_state)
+
+
+def test_bad_input_is_named() -> None:
+    with pytest.raises(ModelError, match=r"\(n, 3\)"):
+        simulate_many(LOOP, [1.0, 0.0, 0.0], duration=1.0)
+    with pytest.raises(ModelError, match="each of 7 starts"):
+        simulate_many(LOOP, STARTS, duration=1.0, gains=ROWS[:3])
+    with pytest.raises(ModelError, match="n1 > 0"):
+        simulate_many(LOOP, STARTS, duration=1.0, gains=0.0 * ROWS)
+    with pytest.raises(ModelError, match="tolerance"):
+        simulate_many(LOOP, STARTS, duration=1.0, tolerance=0.0)
