@@ -14,7 +14,7 @@ named by the event that appears; what the motion settles on beyond it begins a b
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Final, Literal
@@ -26,7 +26,7 @@ from compensation.cycle_ends import CycleEvent, Neighbourhood, crossing, end_of
 from compensation.cycle_modes import Stick, events_of, mode_sequence, stick_phases
 from compensation.loop_section import GAIN_NAMES, LoopSection, with_gain
 from compensation.orbits.continuation import Curve, CurveEvent, Steps, trace
-from compensation.orbits.cycle_equation import CycleEquation
+from compensation.orbits.cycle_equation import JOINED, CycleEquation
 from compensation.orbits.periodic_orbits import Cycle, cycle_at, find_cycle, shoot
 from compensation.orbits.solution_curve import CurvePoint, Lost
 from ident.model.friction import ModelError
@@ -94,6 +94,12 @@ def cycle_branches(
             continue
         widest = max([cycle.amplitude, *(point.cycle.amplitude for b in branches for point in b.points)])
         branch, found = _follow(loop, gain, span, at, cycle, widest, steps)
+        if branch.events[0].says == JOINED and len(branch.points) == 1:
+            fewer = max(part for part in range(1, cycle.returns) if cycle.returns % part == 0)
+            todo.insert(0, (at, replace(cycle, returns=fewer)))
+            continue
+        if branches and len(branch.points) < 2:
+            continue
         branches.append(branch)
         todo.extend(found)
     return tuple(branches)

@@ -16,13 +16,13 @@ import numpy as np
 from compensation.cycle_modes import events_of, parting
 from compensation.loop_section import PATIENCE, LoopSection
 from compensation.orbits.continuation import Curve, CurveEvent, other_branch
-from compensation.orbits.cycle_equation import MET_EQUILIBRIUM, CycleEquation
+from compensation.orbits.cycle_equation import JOINED, MET_EQUILIBRIUM, CycleEquation
 from compensation.orbits.periodic_orbits import Cycle, cycle_at, find_cycle
 from compensation.orbits.solution_curve import CurvePoint
 from ident.simulation.filippov_system import FloatArray
 
 BEYOND: Final = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)  # [scaled] how far beyond an end to look
-BRANCH_OFF: Final = 1e-3  # [scaled] distance at which a branch that crosses is picked up
+BRANCH_OFF: Final = (1e-3, 1e-4)  # [scaled] distances at which a branch that crosses is looked for
 RANGE: Final = "end of the parameter's range"
 RESTS: Final = "meets an equilibrium: the link comes to rest on the way"
 TOO_LONG: Final = f"a return takes more than {PATIENCE:g} s"
@@ -70,6 +70,9 @@ def end_of(around: Neighbourhood, curve: Curve) -> tuple[CycleEvent, list[tuple[
         return CycleEvent("end", last.p, curve.end_reason), []
     if curve.end_reason == MET_EQUILIBRIUM:
         return CycleEvent("end", _vanishing(around.equation, curve), MET_EQUILIBRIUM), []
+    if curve.end_reason == JOINED:
+        at = curve.events[-1] if curve.events else last
+        return CycleEvent("end", at.p, JOINED), []
     beyond = _beyond(around, last)
     if curve.end_reason in LOSSES:
         return CycleEvent("end", last.p, LOSSES[curve.end_reason]), beyond
@@ -87,12 +90,14 @@ def crossing(around: Neighbourhood, event: CurveEvent) -> list[tuple[float, Cycl
         equation = replace(equation, returns=2 * equation.returns)
     elif event.kind != "branch point":
         return []
-    found = []
-    for point in other_branch(equation, event, scale=around.scale, length=BRANCH_OFF):
-        cycle = cycle_at(around.section(point.p), point.x, equation.returns)
-        if isinstance(cycle, Cycle) and around.span[0] <= point.p <= around.span[1]:
-            found.append((point.p, cycle))
-    return found
+    for length in BRANCH_OFF:
+        sides = other_branch(equation, event, scale=around.scale, length=length)
+        inside = [point for point in sides if around.span[0] <= point.p <= around.span[1]]
+        found = [(point.p, cycle_at(around.section(point.p), point.x, equation.returns)) for point in inside]
+        cycles = [(value, cycle) for value, cycle in found if isinstance(cycle, Cycle)]
+        if cycles:
+            return cycles
+    return []
 
 
 def _vanishing(equation: CycleEquation, curve: Curve) -> float:
@@ -103,17 +108,18 @@ def _vanishing(equation: CycleEquation, curve: Curve) -> float:
 
 
 def _beyond(around: Neighbourhood, last: CurvePoint) -> list[tuple[float, Cycle]]:
-    """What the motion settles on where the branch is no more: the nearest place where it is a cycle."""
+    """What the motion settles on where the branch is no more: the nearest cycle of each number of returns."""
+    found: dict[int, tuple[float, Cycle]] = {}
     for distance in BEYOND:
         point, gain = around.ahead(last, distance)
         if not around.span[0] <= gain <= around.span[1]:
             continue
         cycle = find_cycle(around.section(gain), point)
-        if isinstance(cycle, Cycle) and cycle.returns != around.equation.returns:
-            return [(gain, cycle)]
-        if isinstance(cycle, Cycle) and _apart(cycle, last, around.equation):
-            return [(gain, cycle)]
-    return []
+        if isinstance(cycle, Cycle) and cycle.returns not in found:
+            other = cycle.returns != around.equation.returns or _apart(cycle, last, around.equation)
+            if other:
+                found[cycle.returns] = (gain, cycle)
+    return list(found.values())
 
 
 def _apart(cycle: Cycle, last: CurvePoint, equation: CycleEquation) -> bool:

@@ -97,7 +97,8 @@ def trace(
     first = u if isinstance(u, Lost) else scaled.point(u, ahead)
     if isinstance(first, Lost):
         return first
-    return _follow(scaled, first, span, steps)
+    ending = problem.ending(first.x, first.p)
+    return _follow(scaled, first, span, steps) if ending is None else Lost(ending)
 
 
 def other_branch(
@@ -146,7 +147,11 @@ def _follow(scaled: Scaled, first: CurvePoint, span: tuple[float, float], steps:
             if length < steps.shortest:
                 return Curve(tuple(points), tuple(events), _why(scaled, before, after, steps.shortest))
             continue
-        events.extend(_events_between(scaled, before, after))
+        for event in _events_between(scaled, before, after):
+            events.append(event)
+            ending = scaled.problem.ending(event.x, event.p)
+            if ending is not None:
+                return Curve(tuple(points), tuple(events), ending)
         points.append(after)
         if edge is not None:
             return Curve(tuple(points), tuple(events), "end of the parameter's range")

@@ -22,6 +22,8 @@ from ident.simulation.filippov_system import FloatArray
 DIFFERENCE: Final = 1e-9  # of the parameter, relative
 JUMPED: Final = 10.0  # ratio of the two one-sided differences
 ROUNDING: Final = 1e-14
+SAME: Final = 2e-5  # of its extent: so near points of a cycle are one
+JOINED: Final = "joins a cycle of fewer returns"
 MET_EQUILIBRIUM: Final = "meets the equilibrium"
 
 
@@ -96,5 +98,13 @@ class CycleEquation:
         return self.family(p).follow(x, self.returns).durations
 
     def ending(self, x: FloatArray, p: float) -> str | None:
-        """A cycle that has shrunk to a point ends its branch."""
-        return MET_EQUILIBRIUM if self.size(x, p) < self.vanished else None
+        """A cycle that has shrunk to a point ends its branch, and one that takes its returns twice over."""
+        size = self.size(x, p)
+        if size < self.vanished:
+            return MET_EQUILIBRIUM
+        points = self.family(p).follow(x, self.returns).points
+        for fewer in range(1, self.returns):
+            whole = self.returns % fewer == 0 and points.shape[0] == self.returns
+            if whole and float(np.max(np.abs(points[fewer - 1] - x))) < SAME * size:
+                return JOINED
+        return None
