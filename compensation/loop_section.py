@@ -26,6 +26,7 @@ from ident.simulation.integrate import END_REASONS, SECTION
 
 TOLERANCE: Final = 1e-13  # of a step; series lose nothing by it
 TOLERANCE_ELSE: Final = 1e-11  # of a Dormand-Prince step
+GAIN_NAMES: Final = {"r": "compensation", "L": "observer", "n1": "proportional", "n2": "derivative"}
 PATIENCE: Final = 200.0  # [s] for one half turn
 
 
@@ -85,8 +86,8 @@ class LoopSection:
 
 
 def with_gain(loop: ClosedLoop, parameter: str, value: float) -> ClosedLoop:
-    """The same loop with another r or L [1/s]."""
-    name = {"r": "compensation", "L": "observer"}[parameter]
+    """The same loop with another r, L [1/s], n1 [N m/rad] or n2 [N m s/rad]."""
+    name = GAIN_NAMES[parameter]
     gains = replace(loop.controller.gains, **{name: value})
     return replace(loop, controller=replace(loop.controller, gains=gains))
 

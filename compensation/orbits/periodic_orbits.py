@@ -111,7 +111,7 @@ def shoot(section: ReturnMap, guess: FloatArray, returns: int) -> Cycle | NoCycl
     point = guess
     for _ in range(NEWTON_STEPS):
         done = section.follow(point, returns)
-        slope = _slope(section, point, returns)
+        slope = slope_of(section, point, returns)
         if done.end_reason != "section reached" or slope is None:
             return NoCycle(done.end_reason)
         change = np.linalg.solve(np.eye(point.size) - slope, done.points[-1] - point)
@@ -127,7 +127,7 @@ def cycle_at(section: ReturnMap, point: FloatArray, returns: int) -> Cycle | NoC
     fewer = _repeats(np.concatenate([done.points[-1:], done.points]), SAME_POINT)
     if done.end_reason == "section reached" and 0 < fewer < returns:
         return cycle_at(section, point, fewer)
-    slope = _slope(section, point, returns)
+    slope = slope_of(section, point, returns)
     if done.end_reason != "section reached" or slope is None:
         return NoCycle(done.end_reason)
     point = point + np.linalg.solve(np.eye(point.size) - slope, done.points[-1] - point)
@@ -164,7 +164,8 @@ def _repeats(points: FloatArray, tolerance: float) -> int:
     return 0
 
 
-def _slope(section: ReturnMap, point: FloatArray, returns: int) -> FloatArray | None:
+def slope_of(section: ReturnMap, point: FloatArray, returns: int) -> FloatArray | None:
+    """Derivative (d, d) of `returns` returns from a point (d,), None where there is no return."""
     slope = np.eye(point.size)
     at = point
     for index in range(returns):
