@@ -28,7 +28,7 @@ from ident.simulation.integrate import STEP_LIMIT as STEPS_SPENT
 from ident.simulation.taylor import ORDER, TAYLOR
 
 EVENT_STORE: Final = 256  # of a half turn: chattering beyond that is reported as no return
-STEP_LIMIT: Final = 20_000  # of a half turn, which takes a hundred or so
+STEP_LIMIT: Final = 20_000  # of a turn, which takes a few hundred
 MOST_HALTS: Final = 1000  # in a turn: a link that halts more often is chattering, not turning
 
 
@@ -38,6 +38,7 @@ def _to_halt(
     parameters: FloatArray,
     tolerance: float,
     patience: float,
+    step_limit: int,
     state: FloatArray,
     signs: Signs,
     contact: Signs,
@@ -47,7 +48,7 @@ def _to_halt(
     event_states: FloatArray,
 ) -> Progress:
     """To the next halt of the link, in place."""
-    settings = Settings(tolerance, patience, STEP_LIMIT, MOTION, 0, 1)
+    settings = Settings(tolerance, patience, step_limit, MOTION, 0, 1)
     record = Record(
         np.empty(0), np.empty((0, STATES)), event_times, event_surfaces, event_signs, event_states
     )
@@ -74,12 +75,25 @@ def _returns(
         duration = 0.0
         low = high = state[0]
         returned = False
+        left = STEP_LIMIT
         for _ in range(MOST_HALTS):
             before = state[0]
             end = _to_halt(
-                method, parameters, tolerance, patience, state, signs, contact, times, which, modes, states
+                method,
+                parameters,
+                tolerance,
+                patience,
+                left,
+                state,
+                signs,
+                contact,
+                times,
+                which,
+                modes,
+                states,
             )
             duration += end.time
+            left -= end.steps
             low, high = min(low, state[0]), max(high, state[0])
             if end.reason != SECTION:
                 return row, end.reason
@@ -117,7 +131,18 @@ def _derivative(
     times, which = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64)
     modes, states = np.empty((EVENT_STORE, 2), np.int64), np.empty((EVENT_STORE, STATES))
     end = _to_halt(
-        method, parameters, tolerance, patience, state, signs, contact, times, which, modes, states
+        method,
+        parameters,
+        tolerance,
+        patience,
+        STEP_LIMIT,
+        state,
+        signs,
+        contact,
+        times,
+        which,
+        modes,
+        states,
     )
     if end.reason != SECTION:
         return end.time, end.reason
