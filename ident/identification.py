@@ -24,6 +24,7 @@ from ident.evidence import Evidence, IdentificationError, gather, require_eviden
 from ident.frequency_response import LEAST_SPEED_RATIO, FrequencyInertia
 from ident.friction_fit import DIRECTIONS, SIGN
 from ident.friction_map import MapPoint
+from ident.law_shape import shape_findings
 from ident.parameters import UNITS, Parameters, parameters
 from ident.ripple_correction import ripple_findings
 from ident.stribeck_effect import where_it_shows
@@ -80,6 +81,7 @@ def identify(recordings: Sequence[Recording], *, free_beta: bool = False) -> Ide
             dof = _degrees(weighted)
         notes += _disagreement(sources, unit)
     values = parameters(weighted.data, weighted.fit, axis=axis, dof=dof)
+    notes += [] if free_beta else shape_findings(weighted)
     notes += [*values.findings, *_fit_findings(weighted), *_offset_finding(values, axis)]
     robot = IdentifiedRobot(
         inertia=values.inertia,
