@@ -214,6 +214,7 @@ def test_without_slow_speeds_and_ramps_the_bend_is_withheld() -> None:
     robot = identify(logs).robot
     for curve in (robot.positive, robot.negative):
         assert curve["stribeck_velocity"].value is None
+        assert curve["static_torque"].value is None
         assert curve["viscous_damping"].value == pytest.approx(0.081, rel=0.06)
 
 
