@@ -57,6 +57,7 @@ class Breakaway:
     end: int  # past the last sample of the motion that follows
     end_time: float  # [s]
     why: str | None = None  # why it is left out, beginning with its code
+    place_stderr: float = 0.0  # of the torque, from what varies with position [N m]
 
     @property
     def torque(self) -> float:

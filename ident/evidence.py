@@ -16,6 +16,8 @@ from ident.frequency_response import FrequencyInertia, frequency_inertia
 from ident.friction_map import SteadyRun, steady_runs
 from ident.hunting import SAMPLES, hunts, sensor_noise
 from ident.momentum import Momentum, momentum
+from ident.position_ripple import Wave, find_waves, traces_of
+from ident.ripple_correction import corrected_motions, corrected_runs, corrected_starts
 
 
 class IdentificationError(LogError):
@@ -31,6 +33,7 @@ class Evidence:
     momenta: tuple[Momentum, ...]
     response: FrequencyInertia | None
     response_reasons: dict[str, str]  # log -> why it gave no inertia
+    waves: tuple[Wave, ...] = ()  # of the torque over position; the rest is corrected for them
 
     @property
     def used_runs(self) -> tuple[SteadyRun, ...]:
@@ -59,7 +62,15 @@ def gather(recordings: Sequence[Recording]) -> Evidence:
     response, reasons = frequency_inertia(_of(recordings, "frequency_response"))
     inertia = response.inertia if response is not None else _rough_inertia(runs, momenta)
     steady = tuple(runs) if inertia is None else _without_hunting(recordings, runs, inertia)
-    return Evidence(steady, tuple(starts), tuple(momenta), response, reasons)
+    waves = find_waves(traces_of(recordings, steady, inertia))
+    return Evidence(
+        corrected_runs(recordings, steady, waves),
+        corrected_starts(starts, waves),
+        corrected_motions(momenta, waves),
+        response,
+        reasons,
+        waves,
+    )
 
 
 def _rough_inertia(runs: Sequence[SteadyRun], momenta: Sequence[Momentum]) -> float | None:

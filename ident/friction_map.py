@@ -68,6 +68,7 @@ class SteadyRun:
     start_time: float  # [s]
     end_time: float  # [s]
     why: str | None = None  # why it is left out, beginning with its code
+    place_stderr: float = 0.0  # of the mean torque, from what varies with position [N m]
 
     @property
     def direction(self) -> int:

@@ -24,7 +24,9 @@ from ident.evidence import Evidence, IdentificationError, gather, require_eviden
 from ident.frequency_response import LEAST_SPEED_RATIO, FrequencyInertia
 from ident.friction_fit import DIRECTIONS, SIGN
 from ident.friction_map import MapPoint
+from ident.law_shape import shape_findings
 from ident.parameters import UNITS, Parameters, parameters
+from ident.ripple_correction import ripple_findings
 from ident.stribeck_effect import where_it_shows
 from ident.weighting import Weighted, settle, with_inertia
 from ident.withholding import require_enough
@@ -60,7 +62,12 @@ def identify(recordings: Sequence[Recording], *, free_beta: bool = False) -> Ide
     unit = UNITS[axis]["inertia"]
     dof = _degrees(weighted)
     sources: dict[str, Estimate] = {}
-    notes = [*_log_findings(recordings), *run_findings(evidence), *_missing_tests(evidence)]
+    notes = [
+        *_log_findings(recordings),
+        *run_findings(evidence),
+        *ripple_findings(evidence.waves, axis),
+        *_missing_tests(evidence),
+    ]
     if evidence.momenta:
         sources["breakaway"] = parameters(weighted.data, weighted.fit, axis=axis, dof=dof).inertia
     if evidence.response is not None:
@@ -74,6 +81,7 @@ def identify(recordings: Sequence[Recording], *, free_beta: bool = False) -> Ide
             dof = _degrees(weighted)
         notes += _disagreement(sources, unit)
     values = parameters(weighted.data, weighted.fit, axis=axis, dof=dof)
+    notes += [] if free_beta else shape_findings(weighted)
     notes += [*values.findings, *_fit_findings(weighted), *_offset_finding(values, axis)]
     robot = IdentifiedRobot(
         inertia=values.inertia,

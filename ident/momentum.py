@@ -45,6 +45,7 @@ class Momentum:
     travel: FloatArray  # (k,) [rad]
     gain: FloatArray  # (k,) v2 - v1 [rad/s]
     nodes: FloatArray  # (k, m) speeds through each window, equally spaced in time [rad/s]
+    places: FloatArray  # (k, m) positions at the nodes, as logged [rad]
     speed_covariance: FloatArray  # (k, k) of the gain [(rad/s)^2]
     impulse_variance: FloatArray  # (k,) from the samples' white scatter [(N m s)^2]
 
@@ -89,6 +90,7 @@ def momentum(recording: Recording, start: Breakaway) -> Momentum | None:
         travel=np.diff(position[edges]),
         gain=np.diff(speed),
         nodes=np.maximum(np.interp(nodes, samples, speeds), 0.0),
+        places=start.direction * np.interp(nodes, samples, position),
         speed_covariance=windows @ np.diag(variance) @ windows.T,
         impulse_variance=np.diff(time[edges]) * recording.sample_period * scatter,
     )

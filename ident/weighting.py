@@ -183,7 +183,8 @@ def _own_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatA
     """What a run's own noise and the error of its speed make of its torque's variance (n,) [(N m)^2]."""
     runs = evidence.used_runs
     speed = np.array([run.velocity_stderr for run in runs])
-    return np.asarray(white_variance(runs) + (_slopes(data, fit) * speed) ** 2)
+    place = np.array([run.place_stderr for run in runs])
+    return np.asarray(white_variance(runs) + place**2 + (_slopes(data, fit) * speed) ** 2)
 
 
 def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: RunSpread) -> FitData:
@@ -191,7 +192,8 @@ def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: RunS
     runs, starts = evidence.used_runs, evidence.used_starts
     travel = np.array([run.travel for run in runs])
     start_torque, delay_error = _onset_torque(starts, fit, data.lines)
-    line = np.hypot(np.array([start.line.stderr for start in starts]), delay_error)
+    line = np.array([np.hypot(start.line.stderr, start.place_stderr) for start in starts])
+    line = np.hypot(line, delay_error)
     place = _place_spread(data, fit, start_torque, line, spread)
     scale = _motion_scale(data.momenta, fit, spread)
     return replace(

@@ -90,6 +90,14 @@ def withheld(
         withhold("E-LOWSPEED", ("stribeck_velocity", "stribeck_shape"), text)
         if low < LEAST_SPEEDS and not np.any(data.start_direction == SIGN[direction]):
             withhold("E-LOWSPEED", ("static_torque",), text)
+    begun = np.any(data.start_direction == SIGN[direction])
+    if not begun and not line and _loose(coulomb + stribeck, interval["static_torque"]):
+        withhold(
+            "E-LOWSPEED",
+            ("static_torque",),
+            f"{direction} direction: without breakaways F_s is the law at rest, and the slowest speed, "
+            f"{float(speeds.min()):.3g}, is too far from it. Ramp the torque from rest, or run slower.",
+        )
     for name, value in (("coulomb_torque", coulomb), ("viscous_damping", damping)):
         if not value > AT_BOUND * stderr[name]:
             withhold(

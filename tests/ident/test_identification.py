@@ -214,6 +214,7 @@ def test_without_slow_speeds_and_ramps_the_bend_is_withheld() -> None:
     robot = identify(logs).robot
     for curve in (robot.positive, robot.negative):
         assert curve["stribeck_velocity"].value is None
+        assert curve["static_torque"].value is None
         assert curve["viscous_damping"].value == pytest.approx(0.081, rel=0.06)
 
 
@@ -296,3 +297,12 @@ def test_without_a_stribeck_effect_a_line_is_fitted_and_v_s_withheld() -> None:
             assert estimate.value == pytest.approx(getattr(truth, name), rel=0.01), name
             assert abs(estimate.value - getattr(truth, name)) < 4 * estimate.stderr, name
     assert not {"E-LOWSPEED", "E-BOUND", "E-LOCAL"} & {note.code for note in found.notes}
+
+
+@pytest.mark.parametrize(("shape", "told"), [(2.0, True), (1.0, False)])
+def test_a_stribeck_curve_of_another_shape_is_reported(shape: float, told: bool) -> None:
+    curve = StribeckCurve(0.58, 0.4, 0.07, 0.08, shape)
+    rig = Rig(robot=OneLinkRobot(0.026, StribeckFriction(curve, curve)), torque_noise=0.005)
+    generator = np.random.default_rng(26)
+    notes = identify([*_speeds(rig, generator), *_ramps(rig, generator)]).robot.notes
+    assert any("--free-beta" in note.text for note in notes if note.code == "E-LACKOFFIT") == told
