@@ -10,6 +10,7 @@ far the predicted onset lies outside the recorded bracket.
 
 from __future__ import annotations
 
+import argparse
 import json
 import re
 import tempfile
@@ -17,7 +18,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-from benchmarks.rows import Row, main
+from benchmarks.rows import Row, figure, show
 from pipelines.progress import shown_progress, told
 from pipelines.results.folder import Owner, open_results
 from pipelines.settings.campaign import load_campaign
@@ -42,10 +43,16 @@ def rows(quick: bool) -> list[Row]:
     found = [_round(seed, quick) for seed in range(1, 2 if quick else ROUNDS + 1)]
     cases = found[0].keys()
     worst = {case: (min if case.startswith("inside") else max)(one[case] for one in found) for case in cases}
-    return [
-        {"case": f"demo {case}", "value": worst[case], "target": _target(case), "unit": _unit(case)}
-        for case in cases
-    ]
+    return [figure(f"demo {case}", worst[case], _target(case), _unit(case)) for case in cases]
+
+
+def main() -> None:
+    """As a command."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.identification")
+    parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument("--quick", action="store_true", help="one small campaign")
+    asked = parser.parse_args()
+    show(rows(asked.quick), as_json=asked.json)
 
 
 def _round(seed: int, quick: bool) -> dict[str, float]:
@@ -121,4 +128,4 @@ def _unit(case: str) -> str:
 
 
 if __name__ == "__main__":
-    main("identification", rows)
+    main()

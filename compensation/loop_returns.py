@@ -12,18 +12,19 @@ matrices are well defined, but differences of neighbouring trajectories lose man
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Final
 
 import numpy as np
 
-from compensation.loop_modes import MOTION, SURFACE_ROWS, SYSTEM, surfaces
-from compensation.loop_runs import begin
+from compensation.loop_modes import MOTION, SURFACE_ROWS, SYSTEM
+from compensation.loop_runs import begin, run_dormand_prince, run_series
 from compensation.loop_tangents import DEVIATIONS, STATES, TANGENTS, stick_deviations
 from compensation.orbits.saltation import carry, project_along, saltate
-from ident.simulation.compiled import compiled, inlined
+from ident.simulation.compiled import compiled, inlined, passed
 from ident.simulation.dormand_prince import DORMAND_PRINCE
 from ident.simulation.filippov_system import FloatArray, OneStepMethod, Signs, assign
-from ident.simulation.integrate import SECTION, WORK_ROWS, Progress, Record, Settings, integrate
+from ident.simulation.integrate import SECTION, WORK_ROWS, Progress
 from ident.simulation.integrate import STEP_LIMIT as STEPS_SPENT
 from ident.simulation.taylor import ORDER, TAYLOR
 
@@ -32,32 +33,13 @@ STEP_LIMIT: Final = 20_000  # of a turn, which takes a few hundred
 MOST_HALTS: Final = 1000  # in a turn: a link that halts more often is chattering, not turning
 
 
-@inlined
-def _to_halt(
-    method: OneStepMethod,
-    parameters: FloatArray,
-    tolerance: float,
-    patience: float,
-    step_limit: int,
-    state: FloatArray,
-    signs: Signs,
-    contact: Signs,
-    event_times: FloatArray,
-    event_surfaces: Signs,
-    event_signs: Signs,
-    event_states: FloatArray,
-) -> Progress:
-    """To the next halt of the link, in place."""
-    settings = Settings(tolerance, patience, step_limit, MOTION, 0, 1)
-    record = Record(
-        np.empty(0), np.empty((0, STATES)), event_times, event_surfaces, event_signs, event_states
-    )
-    return integrate(method, SYSTEM, surfaces(), parameters, settings, 0.0, state, signs, contact, record)
+BY_SERIES: Final = passed(run_series)
+BY_DORMAND_PRINCE: Final = passed(run_dormand_prince)
 
 
 @inlined
 def _returns(
-    method: OneStepMethod,
+    run: Callable[..., Progress],
     parameters: FloatArray,
     symmetric: bool,
     tolerance: float,
@@ -78,20 +60,10 @@ def _returns(
         left = STEP_LIMIT
         for _ in range(MOST_HALTS):
             before = state[0]
-            end = _to_halt(
-                method,
-                parameters,
-                tolerance,
-                patience,
-                left,
-                state,
-                signs,
-                contact,
-                times,
-                which,
-                modes,
-                states,
-            )
+            end = run(
+                parameters, tolerance, patience, left, MOTION, 0, 1, 0.0, state, signs, contact,
+                times, states, times, which, modes, states,
+            )  # fmt: skip
             duration += end.time
             left -= end.steps
             low, high = min(low, state[0]), max(high, state[0])
@@ -113,6 +85,7 @@ def _returns(
 
 @inlined
 def _derivative(
+    run: Callable[..., Progress],
     method: OneStepMethod,
     parameters: FloatArray,
     tolerance: float,
@@ -130,20 +103,10 @@ def _derivative(
     assign(mode, signs)
     times, which = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64)
     modes, states = np.empty((EVENT_STORE, 2), np.int64), np.empty((EVENT_STORE, STATES))
-    end = _to_halt(
-        method,
-        parameters,
-        tolerance,
-        patience,
-        STEP_LIMIT,
-        state,
-        signs,
-        contact,
-        times,
-        which,
-        modes,
-        states,
-    )
+    end = run(
+        parameters, tolerance, patience, STEP_LIMIT, MOTION, 0, 1, 0.0, state, signs, contact,
+        np.empty(0), np.empty((0, STATES)), times, which, modes, states,
+    )  # fmt: skip
     if end.reason != SECTION:
         return end.time, end.reason
     polynomials = np.empty((y.size, ORDER + 1))
@@ -201,7 +164,7 @@ def returns_by_series(
     every row stands in the frame of its own half turn: the way is followed by a change of sign. `patience`
     [s] is for one half turn.
     """
-    return _returns(TAYLOR, parameters, symmetric, tolerance, patience, start, points)
+    return _returns(BY_SERIES, parameters, symmetric, tolerance, patience, start, points)
 
 
 @compiled
@@ -214,7 +177,7 @@ def returns_by_dormand_prince(
     points: FloatArray,
 ) -> tuple[int, int]:
     """As `returns_by_series`, for any shape of the laws."""
-    return _returns(DORMAND_PRINCE, parameters, symmetric, tolerance, patience, start, points)
+    return _returns(BY_DORMAND_PRINCE, parameters, symmetric, tolerance, patience, start, points)
 
 
 @compiled
@@ -230,7 +193,7 @@ def derivative_by_series(
 
     Returns its duration [s] and why it ended. `tangent_tolerance` is that of the deviations' steps.
     """
-    return _derivative(TAYLOR, parameters, tolerance, tangent_tolerance, patience, state, out)
+    return _derivative(BY_SERIES, TAYLOR, parameters, tolerance, tangent_tolerance, patience, state, out)
 
 
 @compiled
@@ -243,4 +206,6 @@ def derivative_by_dormand_prince(
     out: FloatArray,
 ) -> tuple[float, int]:
     """As `derivative_by_series`, for any shape of the laws."""
-    return _derivative(DORMAND_PRINCE, parameters, tolerance, tangent_tolerance, patience, state, out)
+    return _derivative(
+        BY_DORMAND_PRINCE, DORMAND_PRINCE, parameters, tolerance, tangent_tolerance, patience, state, out
+    )

@@ -6,7 +6,9 @@ like with v'. So each new coefficient of the state gives the next of E and W, an
 difference exp(-|v|/v_s) - E, its equation is W' = -(sv/v_s) (v' W + x3' E), and no digits are lost.
 
 A convolution is summed in two interleaved halves: additions wait for each other, and two chains wait half as
-long. Indices are unsigned where they are differences, which spares a test for negative ones.
+long; the terms with the newest coefficients come last, from registers, so that all others are summed while
+those are still awaited. Indices are unsigned where they are differences, which spares a test for negative
+ones.
 """
 
 from __future__ import annotations
@@ -66,33 +68,44 @@ def series(
     e = exp(-(k[SIGN2] * x2 / k[WIDTH2]))
     w = fading_difference(e, by_velocity, -k[SIGNV] * x3 / k[WIDTHV]) if shared != 0.0 else exp(-by_velocity)
     faded[0], slid[0] = e, w
-    constant = k[K0]
-    for i in range(order):
+    e0, w0, shared_e0 = e, w, shared * e
+    two_0 = c1 * x1 + c2 * x2 + gain * x3
+    three_0 = (a1 * x1 + a2 * x2 + a3 * x3 + k[K0]) + k2 * e + kv * w
+    both_0, shared_0 = two_0 + three_0, shared * three_0
+    d2[0], d3[0], dv[0] = two_0, three_0, both_0
+    x1, x2, x3 = x2 + x3, two_0, three_0
+    p1[1], p2[1], p3[1] = x1, x2, x3
+    e, w = rate2 * (two_0 * e0), ratev * (both_0 * w0 + three_0 * shared_e0)
+    faded[1], slid[1] = e, w
+    for i in range(1, order):
         step = 1.0 / (i + 1)
-        two = c1 * x1 + c2 * x2 + gain * x3
-        three = (a1 * x1 + a2 * x2 + a3 * x3 + constant) + k2 * e + kv * w
-        constant = 0.0
-        d2[i], d3[i], dv[i] = two, three, two + three
-        x1, x2, x3 = (x2 + x3) * step, two * step, three * step
-        p1[i + 1], p2[i + 1], p3[i + 1] = x1, x2, x3
         fade, fade_odd = 0.0, 0.0
         slide, slide_odd = 0.0, 0.0
         share, share_odd = 0.0, 0.0
-        for pair in range((i + 1) >> 1):
-            even, odd = np.uint64(2 * pair), np.uint64(2 * pair + 1)
-            back, further = np.uint64(i - 2 * pair), np.uint64(i - 2 * pair - 1)
-            fade += d2[even] * faded[back]
-            slide += dv[even] * slid[back]
-            share += d3[even] * faded[back]
-            fade_odd += d2[odd] * faded[further]
-            slide_odd += dv[odd] * slid[further]
-            share_odd += d3[odd] * faded[further]
+        for pair in range((i - 1) >> 1):
+            odd, even = np.uint64(2 * pair + 1), np.uint64(2 * pair + 2)
+            back, further = np.uint64(i - 2 * pair - 1), np.uint64(i - 2 * pair - 2)
+            fade_odd += d2[odd] * faded[back]
+            slide_odd += dv[odd] * slid[back]
+            share_odd += d3[odd] * faded[back]
+            fade += d2[even] * faded[further]
+            slide += dv[even] * slid[further]
+            share += d3[even] * faded[further]
         if i & 1 == 0:
-            fade += d2[i] * faded[0]
-            slide += dv[i] * slid[0]
-            share += d3[i] * faded[0]
-        e = rate2 * step * (fade + fade_odd)
-        w = ratev * step * ((slide + slide_odd) + shared * (share + share_odd))
+            before = np.uint64(i - 1)
+            fade += d2[before] * faded[1]
+            slide += dv[before] * slid[1]
+            share += d3[before] * faded[1]
+        two = c1 * x1 + c2 * x2 + gain * x3
+        three = (a1 * x1 + a2 * x2 + a3 * x3) + k2 * e + kv * w
+        both = two + three
+        fade = (fade + fade_odd) + two_0 * e
+        slide = (slide + slide_odd) + shared * (share + share_odd) + (both_0 * w + shared_0 * e)
+        x1, x2, x3 = (x2 + x3) * step, two * step, three * step
+        p1[i + 1], p2[i + 1], p3[i + 1] = x1, x2, x3
+        d2[i], d3[i], dv[i] = two, three, both
+        e = rate2 * step * (fade + two * e0)
+        w = ratev * step * (slide + (both * w0 + three * shared_e0))
         faded[i + 1], slid[i + 1] = e, w
     if -rate2 * p2[0] > order or -ratev * (p2[0] + p3[0]) > order:
         return _reach(coefficients, order, rate2, ratev)
