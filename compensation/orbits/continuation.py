@@ -39,7 +39,7 @@ BISECTIONS: Final = 60
 LOCATED: Final = 1e-12  # of the step in which an event is
 CROSSED: Final = 0.1  # of the rank's measure nearby: so much is left of it at a branch point
 FLAT: Final = 1e-3  # a tangent's part along p below which the way to a value of p is no guide
-STRANGE: Final = 0.5  # relative change of a companion in one step
+STRANGE: Final = 0.1  # relative change of a companion in one step
 JUMP: Final = 1e3  # steps by which F misses zero where a solution jumps
 
 
