@@ -37,9 +37,9 @@ LONGER: Final = 1.6
 SHORTER: Final = 0.3
 BISECTIONS: Final = 60
 LOCATED: Final = 1e-12  # of the step in which an event is
-CROSSED: Final = 1e-2  # of the rank's measure nearby: so much is left of it at a branch point
+CROSSED: Final = 0.1  # of the rank's measure nearby: so much is left of it at a branch point
 FLAT: Final = 1e-3  # a tangent's part along p below which the way to a value of p is no guide
-STRANGE: Final = 0.5  # relative change of a companion in one step
+STRANGE: Final = 0.1  # relative change of a companion in one step
 JUMP: Final = 1e3  # steps by which F misses zero where a solution jumps
 
 
@@ -232,35 +232,53 @@ def _located(
     """The point between two where `value` changes sign, by false position kept inside its bracket."""
     base = scaled.join(before.x, before.p)
     chord = scaled.join(after.x, after.p) - base
-    low, high = 0.0, float(np.linalg.norm(chord))
-    chord = chord / high
-    whole = high
+    whole = float(np.linalg.norm(chord))
+    low, high = 0.0, 1.0
     at_low, at_high = value(before), value(after)
-    best = after
+    best = above = after
+    below = before
     side = 0
     for _ in range(BISECTIONS):
         share = at_low / (at_low - at_high) if abs(at_low) != abs(at_high) else 0.5
         for part in (min(max(share, 0.01), 0.99), 0.4, 0.6):  # a singular point is gone round
             middle = low + part * (high - low)
-            u = correct(scaled, base, chord, middle)
+            guess = base + _cubic(chord, before.tangent * whole, after.tangent * whole, middle)
+            u = correct(scaled, guess, chord / whole, 0.0, room=whole)
             point = u if isinstance(u, Lost) else scaled.point(u, before.tangent)
             if isinstance(point, CurvePoint):
                 break
         if isinstance(point, Lost):
-            break
+            return _between(scaled, below, above, value)
         now = value(point)
         best = point
-        if now == 0.0 or high - low <= LOCATED * whole:
+        if now == 0.0 or high - low <= LOCATED:
             break
         if (now > 0.0) == (at_high > 0.0):
-            high, at_high = middle, now
+            high, at_high, above = middle, now, point
             at_low = 0.5 * at_low if side == 1 else at_low
             side = 1
         else:
-            low, at_low = middle, now
+            low, at_low, below = middle, now, point
             at_high = 0.5 * at_high if side == -1 else at_high
             side = -1
     return best
+
+
+def _cubic(chord: FloatArray, first: FloatArray, last: FloatArray, part: float) -> FloatArray:
+    """Hermite's way (n + 1,) to a `part` of a chord, with given tangents at its ends: it knows the bend."""
+    rest = 1.0 - part
+    way: FloatArray = part**2 * (3.0 - 2.0 * part) * chord + part * rest * (rest * first - part * last)
+    return way
+
+
+def _between(
+    scaled: Scaled, below: CurvePoint, above: CurvePoint, value: Callable[[CurvePoint], float]
+) -> CurvePoint:
+    """The point where `value` vanishes on the chord: so near to a crossing the corrector finds no way."""
+    start, end = scaled.join(below.x, below.p), scaled.join(above.x, above.p)
+    share = value(below) / (value(below) - value(above))
+    point = scaled.point(start + share * (end - start), below.tangent)
+    return above if isinstance(point, Lost) else point
 
 
 def _back(scaled: Scaled, first: CurvePoint, before: CurvePoint, after: CurvePoint) -> bool:
