@@ -29,7 +29,7 @@ from ident.simulation.integrate import STEP_LIMIT as STEPS_SPENT
 from ident.simulation.taylor import ORDER, TAYLOR
 
 EVENT_STORE: Final = 256  # of a half turn: chattering beyond that is reported as no return
-STEP_LIMIT: Final = 20_000  # of a turn, which takes a few hundred
+STEP_LIMIT: Final = 5_000  # of a turn, which takes a few hundred
 MOST_HALTS: Final = 1000  # in a turn: a link that halts more often is chattering, not turning
 
 
