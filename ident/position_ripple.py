@@ -51,7 +51,7 @@ class Trace:
     direction: int
     position: FloatArray  # (m,) [rad]
     torque: FloatArray  # (m,) [N m]
-    smooth: FloatArray  # (m, 2) orthonormal: what mean and trend span
+    smooth: FloatArray  # (m, 2) orthonormal: what mean and trend span [-]
     stride: float  # travel of a block [rad]
 
     @property
@@ -74,7 +74,7 @@ class Wave:
     """One wave of r(q). Where it is not coherent only its size is known."""
 
     wavenumber: float  # k [rad^-1]
-    wavenumber_stderr: float
+    wavenumber_stderr: float  # [rad^-1]
     centre: float  # mean position of the data, where phases are known best [rad]
     coefficients: dict[int, FloatArray]  # direction -> A, B [N m]
     covariance: dict[int, FloatArray]  # direction -> (2, 2)
