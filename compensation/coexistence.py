@@ -126,11 +126,12 @@ def _touch_by_search(curve: StribeckCurve, slope: float, held: float) -> tuple[f
         fall: float = curve.stribeck_torque * beta * y * math.exp(-y) / speed
         return (held - slope * speed) * fall / dry(y) - slope
 
+    def floor(y: float) -> float:
+        return beta * y * curve.coulomb_torque / dry(y) if curve.coulomb_torque > 0.0 else 0.0
+
     def bend(speed: float) -> float:
         y: float = (speed / width) ** beta
-        return (
-            (beta - 1.0) - beta * y * curve.coulomb_torque / dry(y) - slope * speed / (held - slope * speed)
-        )
+        return (beta - 1.0) - floor(y) - slope * speed / (held - slope * speed)
 
     near, far = 1e-12 * min(end, width), end * (1.0 - 1e-15)
     low = near

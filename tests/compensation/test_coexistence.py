@@ -76,7 +76,7 @@ def test_sets_are_there_up_to_r_max_and_gone_beyond(robot: OneLinkRobot, control
 
 @given(
     st.floats(0.5, 2.0),
-    st.floats(0.0, 0.6),
+    st.floats(0.01, 0.6),
     st.floats(0.01, 0.3),
     st.floats(0.02, 0.3),
     st.floats(1.0, 150.0),
