@@ -1,6 +1,8 @@
 """The event loop compiled for the closed loop: one kernel for each one-step method, both kept on disk.
 
 Taylor series serve Stribeck shapes of 1, Dormand and Prince's method all others (`is_analytic` decides).
+Both kernels have one signature: others call the one that they are given by its address, and need not be
+compiled for each.
 """
 
 from __future__ import annotations
@@ -8,16 +10,23 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numba import float64, int64, types
 
 from compensation.loop_modes import MOTION, SYSTEM, surfaces
 from compensation.loop_parameters import SHAPE2, SHAPEV
-from ident.simulation.compiled import compiled
+from ident.simulation.compiled import address_of, calls, compiled
 from ident.simulation.dormand_prince import DORMAND_PRINCE
 from ident.simulation.filippov_system import FloatArray, Signs, resolve, switching_value
 from ident.simulation.integrate import Progress, Record, Settings, integrate
 from ident.simulation.taylor import TAYLOR
 
 SLIP_MODES: Final = 4
+PROGRESS: Final = types.NamedTuple((float64, *4 * (int64,)), Progress)  # type: ignore[no-untyped-call]  # numba
+RUN: Final = PROGRESS(
+    float64[:, ::1], float64, float64, int64, int64, int64, int64, float64, float64[::1], int64[::1],
+    int64[::1], float64[::1], float64[:, ::1], float64[::1], int64[::1], int64[:, ::1], float64[:, ::1],
+)  # fmt: skip
+run_at: Final = calls(RUN)  # run_at(address, arguments of `run_series`)
 EVENT_NAMES: Final = ("stick", "slip", "velocity reversal", "estimate reversal")
 
 
@@ -29,6 +38,11 @@ def is_analytic(parameters: FloatArray) -> bool:
         if parameters[mode, SHAPE2] != 1.0 or parameters[mode, SHAPEV] != 1.0:
             others += 1
     return others == 0
+
+
+def run_for(parameters: FloatArray) -> int:
+    """Address of the kernel that integrates a loop with these parameters (6, 16)."""
+    return address_of(run_series if is_analytic(parameters) else run_dormand_prince, RUN)
 
 
 @compiled

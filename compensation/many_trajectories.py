@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.closed_loop import STEP_LIMIT, ClosedLoop, checked_times
-from compensation.loop_runs import begin, is_analytic, run_dormand_prince, run_series
+from compensation.loop_runs import begin, run_at, run_for
 from compensation.loop_tables import gain_row, tables_over_gains
 from ident.model.friction import ModelError
 from ident.simulation.compiled import compiled
@@ -69,7 +69,7 @@ def simulate_many(
     ModelError
         If starts, gains, times or tolerance are no numbers, have no fitting shape or run backwards.
     """
-    first = np.array(starts, dtype=np.float64)
+    first = np.array(starts, dtype=np.float64, order="C")
     if first.ndim != 2 or first.shape[1] != STATES or not np.isfinite(first).all():
         raise ModelError(f"starts of shape {first.shape}: finite numbers of shape (n, 3) are needed (eq 8)")
     rows = np.asarray(gain_row(loop.controller)[np.newaxis] if gains is None else gains, dtype=np.float64)
@@ -80,13 +80,14 @@ def simulate_many(
     if not (0 < duration < np.inf and 0 < tolerance < 1):
         raise ModelError(f"duration {duration} s, tolerance {tolerance}: positive, the tolerance below 1")
     tables = tables_over_gains(loop.robot, loop.controller, rows)
+    runs = np.array([run_for(tables[0])])  # the laws, and so the method, are the same for all
     wanted = checked_times(times, duration)
     count = first.shape[0]
     states = np.full((count, wanted.size, STATES), np.nan)
     end_times, reasons = np.empty(count), np.empty(count, np.int64)
 
     def run_part(part: int) -> None:
-        run_every(tables, part, parts, tolerance, duration, first, wanted, states, end_times, reasons)
+        run_every(runs, tables, part, parts, tolerance, duration, first, wanted, states, end_times, reasons)
 
     for _ in map_parts(run_part, range(parts)):
         pass
@@ -95,6 +96,7 @@ def simulate_many(
 
 @compiled
 def run_every(
+    runs: Signs,
     tables: FloatArray,
     part: int,
     parts: int,
@@ -106,21 +108,21 @@ def run_every(
     end_times: FloatArray,
     reasons: Signs,
 ) -> None:
-    """Trajectories `part`, `part` + `parts`, ...; `starts` become their ends."""
+    """Trajectories `part`, `part` + `parts`, ...; `starts` become their ends.
+
+    `runs` are addresses of the kernels of `loop_runs`, one for all or one for each.
+    """
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     at, which = np.empty(0), np.empty(0, np.int64)
     modes, where = np.empty((0, 2), np.int64), np.empty((0, STATES))
     for i in range(part, starts.shape[0], parts):
         table = tables[min(i, tables.shape[0] - 1)]
         begin(table, starts[i], signs, contact)
-        if is_analytic(table):
-            end = run_series(
+        end = run_at(
+            runs[min(i, runs.size - 1)],
+            (
                 table, tolerance, duration, STEP_LIMIT, -1, 0, 0, 0.0, starts[i], signs, contact,
                 times, states[i], at, which, modes, where,
-            )  # fmt: skip
-        else:
-            end = run_dormand_prince(
-                table, tolerance, duration, STEP_LIMIT, -1, 0, 0, 0.0, starts[i], signs, contact,
-                times, states[i], at, which, modes, where,
-            )  # fmt: skip
+            ),
+        )  # fmt: skip
         end_times[i], reasons[i] = end.time, end.reason
