@@ -21,7 +21,7 @@ from compensation.loop_modes import MOTION, SURFACE_ROWS, SYSTEM
 from compensation.loop_runs import begin, is_analytic, run_at
 from compensation.loop_tangents import DEVIATIONS, STATES, TANGENTS, stick_deviations
 from compensation.orbits.saltation import carry, project_along, saltate
-from ident.simulation.compiled import address_of, calls, compiled
+from ident.simulation.compiled import address_of, calls, compiled, owning
 from ident.simulation.dormand_prince import DORMAND_PRINCE
 from ident.simulation.filippov_system import FloatArray, Signs, assign
 from ident.simulation.integrate import SECTION, WORK_ROWS
@@ -71,7 +71,7 @@ def carry_for(parameters: FloatArray) -> int:
     return address_of(carry_by_series if is_analytic(parameters) else carry_by_dormand_prince, CARRY)
 
 
-@compiled
+@owning
 def returns(
     run: int,
     parameters: FloatArray,
@@ -126,7 +126,7 @@ def returns(
     return points.shape[0], SECTION
 
 
-@compiled
+@owning
 def derivative(
     run: int,
     carried: int,
@@ -186,7 +186,7 @@ def derivative(
     return end.time, SECTION
 
 
-@compiled
+@owning
 def _rate(parameters: FloatArray, mode: Signs, state: FloatArray, out: FloatArray) -> None:
     """dx/dt (3,) in a slip mode or, the velocity held at zero, in a stick."""
     if mode[MOTION] != 0:

@@ -14,10 +14,10 @@ from numba import float64, int64, types
 
 from compensation.loop_modes import MOTION, SYSTEM, surfaces
 from compensation.loop_parameters import SHAPE2, SHAPEV
-from ident.simulation.compiled import address_of, calls, compiled
+from ident.simulation.compiled import address_of, calls, compiled, owning
 from ident.simulation.dormand_prince import DORMAND_PRINCE
 from ident.simulation.filippov_system import FloatArray, Signs, resolve, switching_value
-from ident.simulation.integrate import Progress, Record, Settings, integrate
+from ident.simulation.integrate import Progress, Record, Settings, integrate, memory_shape
 from ident.simulation.taylor import TAYLOR
 
 SLIP_MODES: Final = 4
@@ -45,7 +45,7 @@ def run_for(parameters: FloatArray) -> int:
     return address_of(run_series if is_analytic(parameters) else run_dormand_prince, RUN)
 
 
-@compiled
+@owning
 def begin(parameters: FloatArray, state: FloatArray, signs: Signs, contact: Signs) -> None:
     """The mode in which a state starts, into `signs` and `contact` (2,).
 
@@ -59,7 +59,7 @@ def begin(parameters: FloatArray, state: FloatArray, signs: Signs, contact: Sign
             signs[i] = 0
         return
     on = surfaces()
-    rate = np.empty(state.size)
+    rate = np.empty(2 * state.size)
     for i in range(signs.size):
         signs[i] = 1 if switching_value(on, i, state) >= 0.0 else -1
     for i in range(signs.size):
@@ -83,7 +83,7 @@ def name_events(surfaces_met: Signs, modes: Signs, moving: int) -> None:
         moving = after
 
 
-@compiled
+@owning
 def run_series(
     parameters: FloatArray,
     tolerance: float,
@@ -106,10 +106,13 @@ def run_series(
     """`integrate` by Taylor series; the arguments are its `Settings` and its `Record`, one by one."""
     settings = Settings(tolerance, end, step_limit, section, section_side, returns)
     record = Record(times, states, event_times, event_surfaces, event_signs, event_states)
-    return integrate(TAYLOR, SYSTEM, surfaces(), parameters, settings, time, state, signs, contact, record)
+    memory = np.empty(memory_shape(state.size, signs.size))
+    return integrate(
+        TAYLOR, SYSTEM, surfaces(), parameters, settings, time, state, signs, contact, record, memory
+    )
 
 
-@compiled
+@owning
 def run_dormand_prince(
     parameters: FloatArray,
     tolerance: float,
@@ -132,6 +135,7 @@ def run_dormand_prince(
     """`integrate` by Dormand and Prince's method; arguments as for `run_series`."""
     settings = Settings(tolerance, end, step_limit, section, section_side, returns)
     record = Record(times, states, event_times, event_surfaces, event_signs, event_states)
+    memory = np.empty(memory_shape(state.size, signs.size))
     return integrate(
-        DORMAND_PRINCE, SYSTEM, surfaces(), parameters, settings, time, state, signs, contact, record
+        DORMAND_PRINCE, SYSTEM, surfaces(), parameters, settings, time, state, signs, contact, record, memory
     )

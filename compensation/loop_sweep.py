@@ -14,7 +14,7 @@ import numpy as np
 
 from compensation.loop_modes import POSITION
 from compensation.loop_returns import MOST_HALTS, derivative, returns
-from ident.simulation.compiled import compiled
+from ident.simulation.compiled import compiled, owning
 from ident.simulation.filippov_system import FloatArray, Signs
 from ident.simulation.integrate import SECTION
 
@@ -29,7 +29,7 @@ MOST_RETURNS: Final = 8
 TANGENT_TOLERANCE: Final = 1e-9  # of a step of the derivative, against the multipliers' absolute 1e-8
 
 
-@compiled
+@owning
 def sweep(
     run: int,
     carried: int,
@@ -68,7 +68,7 @@ def sweep(
             return
 
 
-@compiled
+@owning
 def cycle_from(
     run: int,
     carried: int,
@@ -103,7 +103,7 @@ def cycle_from(
     return UNDECIDED
 
 
-@compiled
+@owning
 def _turn(
     run: int,
     carried: int,

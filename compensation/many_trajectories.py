@@ -1,4 +1,7 @@
-"""Many trajectories of the closed loop at once: arrays of starts and gains, on all cores.
+"""Many trajectories of the closed loop at once: arrays of starts and gains, side by side and on all cores.
+
+Where the modes have Taylor series, eight trajectories go side by side in the lanes of packs
+(`simulation.lanes`); others go one by one.
 
 Neighbouring trajectories cost alike, and their cost changes along a sorted gain: part p of P takes every P-th
 from the p-th on, so that all parts end together. A part is one compiled call that releases the interpreter
@@ -15,14 +18,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.closed_loop import STEP_LIMIT, ClosedLoop, checked_times
-from compensation.loop_runs import begin, run_at, run_for
+from compensation.loop_lanes import LOOP_LANES
+from compensation.loop_modes import surfaces
+from compensation.loop_parameters import COLUMNS
+from compensation.loop_runs import begin, is_analytic, run_at, run_for
 from compensation.loop_tables import gain_row, tables_over_gains
 from ident.model.friction import ModelError
-from ident.simulation.compiled import compiled
+from ident.simulation.compiled import compiled, owning, passed
 from ident.simulation.filippov_system import FloatArray, Signs
-from ident.simulation.integrate import END_REASONS
+from ident.simulation.integrate import END_REASONS, Progress
+from ident.simulation.lanes import LANES, Batch, integrate_side_by_side, lanes_of, table_of
 
 STATES: Final = 3
+SURFACES: Final = 2
 
 
 class MapParts(Protocol):
@@ -86,8 +94,10 @@ def simulate_many(
     states = np.full((count, wanted.size, STATES), np.nan)
     end_times, reasons = np.empty(count), np.empty(count, np.int64)
 
+    follow = run_side_by_side if is_analytic(tables[0]) and count >= parts * LANES else run_every
+
     def run_part(part: int) -> None:
-        run_every(runs, tables, part, parts, tolerance, duration, first, wanted, states, end_times, reasons)
+        follow(runs, tables, part, parts, tolerance, duration, first, wanted, states, end_times, reasons)
 
     for _ in map_parts(run_part, range(parts)):
         pass
@@ -95,6 +105,69 @@ def simulate_many(
 
 
 @compiled
+def _go_on(
+    run: int,
+    batch: Batch,
+    index: int,
+    tolerance: float,
+    end: float,
+    steps: int,
+    time: float,
+    output: int,
+) -> Progress:
+    """One trajectory of a batch by itself, `integrate`; none of its events are kept."""
+    now: Progress = run_at(
+        run,
+        (
+            batch.tables[table_of(batch, index)], tolerance, end, steps, -1, 0, 0, time, batch.states[index],
+            batch.signs[index], batch.contacts[index], batch.times[output:], batch.wanted[index, output:],
+            batch.times[:0], batch.signs[index, :0], batch.signs[:0], batch.states[:0],
+        ),
+    )  # fmt: skip
+    return now
+
+
+GO_ON: Final = passed(_go_on)
+
+
+@owning
+def run_side_by_side(
+    runs: Signs,
+    tables: FloatArray,
+    part: int,
+    parts: int,
+    tolerance: float,
+    duration: float,
+    starts: FloatArray,
+    times: FloatArray,
+    states: FloatArray,
+    end_times: FloatArray,
+    reasons: Signs,
+) -> None:
+    """As `run_every`, eight at a time, where the modes have Taylor series; `runs` (1,)."""
+    count = starts.shape[0]
+    signs, contacts = np.zeros((count, SURFACES), np.int64), np.zeros((count, SURFACES), np.int64)
+    batch = Batch(tables, times, states, starts, signs, contacts, end_times, reasons)
+    for i in range(part, count, parts):
+        begin(tables[table_of(batch, i)], starts[i], signs[i], contacts[i])
+    at, memory = lanes_of(STATES, SURFACES, COLUMNS)
+    integrate_side_by_side(
+        LOOP_LANES,
+        GO_ON,
+        runs[0],
+        surfaces(),
+        batch,
+        at,
+        memory,
+        part,
+        parts,
+        tolerance,
+        duration,
+        STEP_LIMIT,
+    )
+
+
+@owning
 def run_every(
     runs: Signs,
     tables: FloatArray,

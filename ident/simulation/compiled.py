@@ -6,9 +6,12 @@ of everything that a kernel reaches by name: the source files of all kernels tha
 through others, and the values of the constants that they use. The digest is taken when a signature is
 compiled or loaded, so the order of definitions does not matter.
 
-Two decorators:
+Three decorators:
 
-- `compiled` for kernels with plain arguments (numbers, arrays). The machine code is kept on disk.
+- `compiled` for kernels with plain arguments (numbers, arrays). The machine code is kept on disk. They work
+  on memory that they are given, and do not count references to it, which is dear: two atomic operations an
+  array and call.
+- `owning` for kernels that make arrays of their own.
 - `specialised` for kernels that take compiled functions as arguments, such as an integrator that takes a
   vector field. They are compiled into the `compiled` kernel that calls them and are cached with it, not
   by themselves: numba identifies a function argument by the process that made it.
@@ -51,15 +54,20 @@ from numba.extending import intrinsic
 P = ParamSpec("P")
 R = TypeVar("R")
 
-# the last two options are numba's own, not in its documentation
-_UNWRAPPED: Any = dict(error_model="numpy", nogil=True, no_cpython_wrapper=True, no_cfunc_wrapper=True)  # noqa: C408
+# options that numba's documentation does not list, but for the first two
+_OWNING: dict[str, Any] = {"error_model": "numpy", "nogil": True}
+_BORROWING: dict[str, Any] = {**_OWNING, "_nrt": False}
+_UNWRAPPED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` at its first call with given types; the result is cached on disk."""
-    kernel = numba.njit(error_model="numpy", nogil=True)(function)
-    kernel._cache = _ReachingCache(function)  # type: ignore[attr-defined]  # numba has no public way to choose a cache
-    return kernel
+    return _cached(numba.njit(**_BORROWING)(function), function)
+
+
+def owning(function: Callable[P, R]) -> Callable[P, R]:
+    """As `compiled`, for a kernel that makes arrays of its own."""
+    return _cached(numba.njit(**_OWNING)(function), function)
 
 
 def specialised(function: Callable[P, R]) -> Callable[P, R]:
@@ -67,8 +75,13 @@ def specialised(function: Callable[P, R]) -> Callable[P, R]:
 
     It gets no wrapper to be called from Python by, which would take as long to compile as a short kernel.
     """
-    kernel: Callable[P, R] = numba.njit(**_UNWRAPPED)(function)
+    kernel: Callable[P, R] = numba.njit(**_BORROWING, **_UNWRAPPED)(function)
     return kernel
+
+
+def _cached(kernel: Any, function: Callable[P, R]) -> Callable[P, R]:
+    kernel._cache = _ReachingCache(function)  # numba has no public way to choose a cache
+    return cast("Callable[P, R]", kernel)
 
 
 def passed(kernel: Callable[P, R]) -> Callable[P, R]:

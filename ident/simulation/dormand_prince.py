@@ -159,7 +159,7 @@ def repeat_to_event(
     """Take the step again, of the length that ends on the surface: Newton's method on the step itself."""
     n = state.size
     at = part * length
-    end = np.empty(n)
+    end = work[STAGES + 2, :n]
     for _ in range(EVENT_CORRECTIONS):
         dormand_prince_step(system, signs, state, parameters, 1.0, -at, 0.0, polynomials, work)
         for j in range(n):

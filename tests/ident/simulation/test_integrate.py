@@ -10,10 +10,18 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from ident.simulation.compiled import compiled, passed
+from ident.simulation.compiled import compiled, owning, passed
 from ident.simulation.dormand_prince import DORMAND_PRINCE
 from ident.simulation.filippov_system import FilippovSystem, FloatArray, Signs, Surfaces
-from ident.simulation.integrate import EQUILIBRIUM, TIME_REACHED, Progress, Record, Settings, integrate
+from ident.simulation.integrate import (
+    EQUILIBRIUM,
+    TIME_REACHED,
+    Progress,
+    Record,
+    Settings,
+    integrate,
+    memory_shape,
+)
 from ident.simulation.taylor import TAYLOR
 
 MU: Final = 0.1
@@ -51,20 +59,20 @@ ROWS = np.array([[0.0, 1.0, 0.0]])
 PIVOTS = np.array([1])
 
 
-@compiled
+@owning
 def by_series(
     mu: FloatArray, settings: Settings, state: FloatArray, signs: Signs, contact: Signs, record: Record
 ) -> Progress:
-    return integrate(TAYLOR, SYSTEM, Surfaces(ROWS, PIVOTS), mu, settings, 0.0, state, signs, contact, record)
+    on, memory = Surfaces(ROWS, PIVOTS), np.full(memory_shape(2, 1), np.nan)
+    return integrate(TAYLOR, SYSTEM, on, mu, settings, 0.0, state, signs, contact, record, memory)
 
 
-@compiled
+@owning
 def by_dormand_prince(
     mu: FloatArray, settings: Settings, state: FloatArray, signs: Signs, contact: Signs, record: Record
 ) -> Progress:
-    return integrate(
-        DORMAND_PRINCE, SYSTEM, Surfaces(ROWS, PIVOTS), mu, settings, 0.0, state, signs, contact, record
-    )
+    on, memory = Surfaces(ROWS, PIVOTS), np.full(memory_shape(2, 1), np.nan)
+    return integrate(DORMAND_PRINCE, SYSTEM, on, mu, settings, 0.0, state, signs, contact, record, memory)
 
 
 def exact(time: FloatArray, start: float) -> tuple[NDArray[np.float64], float, float]:
