@@ -12,6 +12,7 @@ matrices are well defined, but differences of neighbouring trajectories lose man
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -68,7 +69,12 @@ def carry_by_dormand_prince(
 
 def carry_for(parameters: FloatArray) -> int:
     """Address of the kernel that carries deviations of a loop with these parameters (6, 16)."""
-    return address_of(carry_by_series if is_analytic(parameters) else carry_by_dormand_prince, CARRY)
+    return _carry_address(is_analytic(parameters))
+
+
+@cache
+def _carry_address(analytic: bool) -> int:
+    return address_of(carry_by_series if analytic else carry_by_dormand_prince, CARRY)
 
 
 @owning

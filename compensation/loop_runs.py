@@ -7,6 +7,7 @@ compiled for each.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Final
 
 import numpy as np
@@ -42,7 +43,12 @@ def is_analytic(parameters: FloatArray) -> bool:
 
 def run_for(parameters: FloatArray) -> int:
     """Address of the kernel that integrates a loop with these parameters (6, 16)."""
-    return address_of(run_series if is_analytic(parameters) else run_dormand_prince, RUN)
+    return _address(is_analytic(parameters))
+
+
+@cache
+def _address(analytic: bool) -> int:
+    return address_of(run_series if analytic else run_dormand_prince, RUN)
 
 
 @owning
