@@ -115,7 +115,7 @@ def _passed_at_run_time(context: Any, _builder: object, _type: object, _value: o
 
 
 def address_of(kernel: Callable[..., Any], signature: Signature) -> int:
-    """Where the machine code of a kernel is in this process; it is compiled or loaded if need be (to be kept)."""
+    """Where the machine code of a kernel is in this process, compiled or loaded if need be; to be kept."""
     made: Any = cast("Dispatcher[Callable[..., Any]]", kernel).get_compile_result(signature)
     address: int = made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
     return address
