@@ -17,6 +17,7 @@ from ident.simulation.filippov_system import FloatArray
 SHORTEST = 1e-14  # part of a step below which a double zero counts as one
 ROUNDING = 1e-10  # of the first coefficient that counts, against the sum of the others
 NEWTON_LIMIT = 60
+SETTLED = 4.5e-16  # relative change within which Newton steps only follow rounding
 MOST_CRAWLS = 32  # of the shortest parts: a polynomial that vanishes identically has no first zero
 
 
@@ -118,7 +119,7 @@ def _root(q: FloatArray, degree: int, width: float) -> float:
         after = at - value / slope if slope < 0.0 else 0.5 * (low + high)
         if not low <= after <= high:
             after = 0.5 * (low + high)
-        if abs(after - at) <= 1e-16 * width or after == at:
+        if abs(after - at) <= SETTLED * at:
             return after
         at = after
     return at
