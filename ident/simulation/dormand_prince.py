@@ -12,6 +12,7 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from ident.simulation.compiled import compiled, passed, specialised
+from ident.simulation.crossing import evaluate
 from ident.simulation.filippov_system import (
     FilippovSystem,
     FloatArray,
@@ -29,6 +30,8 @@ _A[12, :12] = DOP853.B
 _A[13:, :] = DOP853.A_EXTRA
 _E3, _E5, _D = np.array(DOP853.E3), np.array(DOP853.E5), np.array(DOP853.D)
 SAFETY, SHRINK, GROW = 0.9, 0.2, 8.0
+DEFECT_AT = 0.73  # of the step
+DEFECT_OVER_ERROR = 8.0
 SHORTEST = 1e-13  # of the time asked for: a field that is not Lipschitz may refuse every error bound
 
 
@@ -65,6 +68,11 @@ def dormand_prince_step(
             _stage(state, work, s, length, stage)
             system.field(signs, stage[:n], parameters, work[s])
         error = length * _error(work, n) / scale
+        if exact or error < 1.0 or length <= shortest:
+            _complete(system, signs, state, parameters, length, polynomials, work)
+            if not exact:
+                defect = length * _defect(system, signs, n, parameters, length, polynomials, work)
+                error = max(error, defect / (DEFECT_OVER_ERROR * scale))
         if exact:
             following = suggested
             break
@@ -75,13 +83,53 @@ def dormand_prince_step(
         factor = SAFETY * error ** (-0.125) if error < np.inf else SHRINK
         length = max(shortest, length * max(SHRINK, factor))
         rejected = True
+    return length, DEGREE, following
+
+
+@specialised
+def _complete(
+    system: FilippovSystem,
+    signs: Signs,
+    state: FloatArray,
+    parameters: FloatArray,
+    length: float,
+    polynomials: FloatArray,
+    work: FloatArray,
+) -> None:
+    """The three stages of the dense output, and its polynomials; the state at the end is kept in `work`."""
+    n = state.size
+    stage, end = work[STAGES], work[STAGES + 1]
     for i in range(n):
-        work[STAGES + 1, i] = stage[i]
+        end[i] = stage[i]
     for s in range(13, STAGES):
         _stage(state, work, s, length, stage)
         system.field(signs, stage[:n], parameters, work[s])
     _dense(state, work, length, polynomials)
-    return length, DEGREE, following
+
+
+@specialised
+def _defect(
+    system: FilippovSystem,
+    signs: Signs,
+    n: int,
+    parameters: FloatArray,
+    length: float,
+    polynomials: FloatArray,
+    work: FloatArray,
+) -> float:
+    """By how much the dense output misses the differential equation at one place inside the step."""
+    at, wanted = work[STAGES], work[STAGES + 2]
+    evaluate(polynomials, n, DEGREE, DEFECT_AT, at)
+    system.field(signs, at[:n], parameters, wanted)
+    largest = 0.0
+    for i in range(n):
+        slope = 0.0
+        for k in range(DEGREE, 0, -1):
+            slope = slope * DEFECT_AT + k * polynomials[i, k]
+        missed = abs(slope / length - wanted[i])
+        if not missed <= largest:
+            largest = missed
+    return largest if np.isfinite(largest) else np.inf
 
 
 @compiled
