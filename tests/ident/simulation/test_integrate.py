@@ -126,6 +126,24 @@ def test_without_friction_energy_is_kept(run: object) -> None:
     assert state == pytest.approx([np.cos(100.0), -np.sin(100.0)], abs=1e-9)
 
 
+@pytest.mark.parametrize("power", [-700, -520, 500])
+def test_steps_are_the_same_at_any_size_of_the_state(power: int) -> None:
+    """Without friction the motion scales with its start: by a power of two bit for bit."""
+    ends = []
+    for size in (1.0, 2.0**power):
+        none = Record(
+            np.empty(0), np.empty((0, 2)), np.empty(0), np.empty(0, np.int64), np.empty((0, 1), np.int64),
+            np.empty((0, 2)),
+        )  # fmt: skip
+        state, signs, contact = np.array([size, 0.0]), np.array([-1]), np.array([1])
+        end = by_dormand_prince(
+            np.array([0.0]), Settings(1e-10, 20.0, 2000, -1, 0, 0), state, signs, contact, none
+        )
+        assert end.reason == TIME_REACHED
+        ends.append((end.steps, *(state / size)))
+    assert ends[1] == ends[0]
+
+
 @compiled
 def braking_field(signs: Signs, state: FloatArray, parameters: FloatArray, out: FloatArray) -> None:
     """A sliding mass under friction that rises steeply at low speed: v' = -sign(v) (1 + 4 exp(-(v/w)^2))."""
