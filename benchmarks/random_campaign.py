@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from compensation.loop_parameters import COLUMNS, ROWS, mode_table
+from compensation.loop_runs import run_for
 from compensation.many_trajectories import run_every
 from ident.simulation.integrate import EQUILIBRIUM, TIME_REACHED
 
@@ -82,10 +83,11 @@ def _run(tables: FloatArray, starts: FloatArray, duration: float) -> tuple[Float
     ends = starts.copy()
     times, states = np.empty(0), np.empty((starts.shape[0], 0, 3))
     end_times, reasons = np.empty(starts.shape[0]), np.empty(starts.shape[0], np.int64)
+    runs = np.array([run_for(table) for table in tables])
     parts = os.cpu_count() or 1
 
     def run_part(part: int) -> None:
-        run_every(tables, part, parts, TOLERANCE, duration, ends, times, states, end_times, reasons)
+        run_every(runs, tables, part, parts, TOLERANCE, duration, ends, times, states, end_times, reasons)
 
     with ThreadPoolExecutor(parts) as threads:
         list(threads.map(run_part, range(parts)))

@@ -12,19 +12,19 @@ matrices are well defined, but differences of neighbouring trajectories lose man
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Final
 
 import numpy as np
+from numba import float64, int64, types
 
 from compensation.loop_modes import MOTION, SURFACE_ROWS, SYSTEM
-from compensation.loop_runs import begin, run_dormand_prince, run_series
+from compensation.loop_runs import begin, is_analytic, run_at
 from compensation.loop_tangents import DEVIATIONS, STATES, TANGENTS, stick_deviations
 from compensation.orbits.saltation import carry, project_along, saltate
-from ident.simulation.compiled import compiled, inlined, passed
+from ident.simulation.compiled import address_of, calls, compiled, owning
 from ident.simulation.dormand_prince import DORMAND_PRINCE
-from ident.simulation.filippov_system import FloatArray, OneStepMethod, Signs, assign
-from ident.simulation.integrate import SECTION, WORK_ROWS, Progress
+from ident.simulation.filippov_system import FloatArray, Signs, assign
+from ident.simulation.integrate import SECTION, WORK_ROWS
 from ident.simulation.integrate import STEP_LIMIT as STEPS_SPENT
 from ident.simulation.taylor import ORDER, TAYLOR
 
@@ -32,14 +32,48 @@ EVENT_STORE: Final = 256  # of a half turn: chattering beyond that is reported a
 STEP_LIMIT: Final = 5_000  # of a turn, which takes a few hundred
 MOST_HALTS: Final = 1000  # in a turn: a link that halts more often is chattering, not turning
 
+CARRY: Final = types.void(
+    float64[:, ::1], int64[::1], float64[::1], float64, float64, float64[:, ::1], float64[:, ::1]
+)
+carry_at: Final = calls(CARRY)  # carry_at(address, arguments of `carry_by_series`)
 
-BY_SERIES: Final = passed(run_series)
-BY_DORMAND_PRINCE: Final = passed(run_dormand_prince)
+
+@compiled
+def carry_by_series(
+    parameters: FloatArray,
+    signs: Signs,
+    state: FloatArray,
+    duration: float,
+    tolerance: float,
+    polynomials: FloatArray,
+    work: FloatArray,
+) -> None:
+    """`orbits.saltation.carry` of the nine states of `loop_tangents` by Taylor series."""
+    carry(TAYLOR, TANGENTS, parameters, signs, state, duration, tolerance, polynomials, work)
 
 
-@inlined
-def _returns(
-    run: Callable[..., Progress],
+@compiled
+def carry_by_dormand_prince(
+    parameters: FloatArray,
+    signs: Signs,
+    state: FloatArray,
+    duration: float,
+    tolerance: float,
+    polynomials: FloatArray,
+    work: FloatArray,
+) -> None:
+    """As `carry_by_series`, for any shape of the laws."""
+    carry(DORMAND_PRINCE, TANGENTS, parameters, signs, state, duration, tolerance, polynomials, work)
+
+
+def carry_for(parameters: FloatArray) -> int:
+    """Address of the kernel that carries deviations of a loop with these parameters (6, 16)."""
+    return address_of(carry_by_series if is_analytic(parameters) else carry_by_dormand_prince, CARRY)
+
+
+@owning
+def returns(
+    run: int,
     parameters: FloatArray,
     symmetric: bool,
     tolerance: float,
@@ -47,6 +81,12 @@ def _returns(
     start: FloatArray,
     points: FloatArray,
 ) -> tuple[int, int]:
+    """Follow the return map from `start` (3,) for as many returns as `points` has rows: (returns, reason).
+
+    A row (5,): x1, x2 of the return, its duration [s], lowest and highest x1 on the way. In the symmetric map
+    every row stands in the frame of its own half turn: the way is followed by a change of sign. `patience`
+    [s] is for one half turn, `run` the address of a kernel of `loop_runs`.
+    """
     state = np.empty(STATES)
     assign(state, start)
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
@@ -60,9 +100,12 @@ def _returns(
         left = STEP_LIMIT
         for _ in range(MOST_HALTS):
             before = state[0]
-            end = run(
-                parameters, tolerance, patience, left, MOTION, 0, 1, 0.0, state, signs, contact,
-                times, states, times, which, modes, states,
+            end = run_at(
+                run,
+                (
+                    parameters, tolerance, patience, left, MOTION, 0, 1, 0.0, state, signs, contact,
+                    times, states, times, which, modes, states,
+                ),
             )  # fmt: skip
             duration += end.time
             left -= end.steps
@@ -83,10 +126,10 @@ def _returns(
     return points.shape[0], SECTION
 
 
-@inlined
-def _derivative(
-    run: Callable[..., Progress],
-    method: OneStepMethod,
+@owning
+def derivative(
+    run: int,
+    carried: int,
     parameters: FloatArray,
     tolerance: float,
     tangent_tolerance: float,
@@ -94,6 +137,11 @@ def _derivative(
     state: FloatArray,
     out: FloatArray,
 ) -> tuple[float, int]:
+    """Derivative (2, 2) of the half turn from the halt `state` (3,), which moves to the next halt.
+
+    Returns its duration [s] and why it ended. `tangent_tolerance` is that of the deviations' steps; `run` and
+    `carried` are the addresses of the kernels that integrate and that carry deviations.
+    """
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     begin(parameters, state, signs, contact)
     y = np.zeros(STATES * (1 + DEVIATIONS))
@@ -103,9 +151,12 @@ def _derivative(
     assign(mode, signs)
     times, which = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64)
     modes, states = np.empty((EVENT_STORE, 2), np.int64), np.empty((EVENT_STORE, STATES))
-    end = run(
-        parameters, tolerance, patience, STEP_LIMIT, MOTION, 0, 1, 0.0, state, signs, contact,
-        np.empty(0), np.empty((0, STATES)), times, which, modes, states,
+    end = run_at(
+        run,
+        (
+            parameters, tolerance, patience, STEP_LIMIT, MOTION, 0, 1, 0.0, state, signs, contact,
+            np.empty(0), np.empty((0, STATES)), times, which, modes, states,
+        ),
     )  # fmt: skip
     if end.reason != SECTION:
         return end.time, end.reason
@@ -119,7 +170,7 @@ def _derivative(
         if mode[MOTION] == 0:
             stick_deviations(deviations, mode[0], parameters, span)
         else:
-            carry(method, TANGENTS, parameters, mode, y, span, tangent_tolerance, polynomials, work)
+            carry_at(carried, (parameters, mode, y, span, tangent_tolerance, polynomials, work))
         assign(y, states[event])
         normal = SURFACE_ROWS[which[event], :STATES]
         _rate(parameters, mode, states[event], before)
@@ -135,7 +186,7 @@ def _derivative(
     return end.time, SECTION
 
 
-@compiled
+@owning
 def _rate(parameters: FloatArray, mode: Signs, state: FloatArray, out: FloatArray) -> None:
     """dx/dt (3,) in a slip mode or, the velocity held at zero, in a stick."""
     if mode[MOTION] != 0:
@@ -147,65 +198,3 @@ def _rate(parameters: FloatArray, mode: Signs, state: FloatArray, out: FloatArra
     SYSTEM.field(slipping, state, parameters, out)
     out[0] = 0.0
     out[2] = -out[1]
-
-
-@compiled
-def returns_by_series(
-    parameters: FloatArray,
-    symmetric: bool,
-    tolerance: float,
-    patience: float,
-    start: FloatArray,
-    points: FloatArray,
-) -> tuple[int, int]:
-    """Follow the return map from `start` (3,) for as many returns as `points` has rows: (returns, reason).
-
-    A row (5,): x1, x2 of the return, its duration [s], lowest and highest x1 on the way. In the symmetric map
-    every row stands in the frame of its own half turn: the way is followed by a change of sign. `patience`
-    [s] is for one half turn.
-    """
-    return _returns(BY_SERIES, parameters, symmetric, tolerance, patience, start, points)
-
-
-@compiled
-def returns_by_dormand_prince(
-    parameters: FloatArray,
-    symmetric: bool,
-    tolerance: float,
-    patience: float,
-    start: FloatArray,
-    points: FloatArray,
-) -> tuple[int, int]:
-    """As `returns_by_series`, for any shape of the laws."""
-    return _returns(BY_DORMAND_PRINCE, parameters, symmetric, tolerance, patience, start, points)
-
-
-@compiled
-def derivative_by_series(
-    parameters: FloatArray,
-    tolerance: float,
-    tangent_tolerance: float,
-    patience: float,
-    state: FloatArray,
-    out: FloatArray,
-) -> tuple[float, int]:
-    """Derivative (2, 2) of the half turn from the halt `state` (3,), which moves to the next halt.
-
-    Returns its duration [s] and why it ended. `tangent_tolerance` is that of the deviations' steps.
-    """
-    return _derivative(BY_SERIES, TAYLOR, parameters, tolerance, tangent_tolerance, patience, state, out)
-
-
-@compiled
-def derivative_by_dormand_prince(
-    parameters: FloatArray,
-    tolerance: float,
-    tangent_tolerance: float,
-    patience: float,
-    state: FloatArray,
-    out: FloatArray,
-) -> tuple[float, int]:
-    """As `derivative_by_series`, for any shape of the laws."""
-    return _derivative(
-        BY_DORMAND_PRINCE, DORMAND_PRINCE, parameters, tolerance, tangent_tolerance, patience, state, out
-    )

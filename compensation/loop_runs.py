@@ -1,6 +1,8 @@
 """The event loop compiled for the closed loop: one kernel for each one-step method, both kept on disk.
 
 Taylor series serve Stribeck shapes of 1, Dormand and Prince's method all others (`is_analytic` decides).
+Both kernels have one signature: others call the one that they are given by its address, and need not be
+compiled for each.
 """
 
 from __future__ import annotations
@@ -8,16 +10,23 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numba import float64, int64, types
 
 from compensation.loop_modes import MOTION, SYSTEM, surfaces
 from compensation.loop_parameters import SHAPE2, SHAPEV
-from ident.simulation.compiled import compiled
+from ident.simulation.compiled import address_of, calls, compiled, owning
 from ident.simulation.dormand_prince import DORMAND_PRINCE
 from ident.simulation.filippov_system import FloatArray, Signs, resolve, switching_value
-from ident.simulation.integrate import Progress, Record, Settings, integrate
+from ident.simulation.integrate import Progress, Record, Settings, integrate, memory_shape
 from ident.simulation.taylor import TAYLOR
 
 SLIP_MODES: Final = 4
+PROGRESS: Final = types.NamedTuple((float64, *4 * (int64,)), Progress)  # type: ignore[no-untyped-call]  # numba
+RUN: Final = PROGRESS(
+    float64[:, ::1], float64, float64, int64, int64, int64, int64, float64, float64[::1], int64[::1],
+    int64[::1], float64[::1], float64[:, ::1], float64[::1], int64[::1], int64[:, ::1], float64[:, ::1],
+)  # fmt: skip
+run_at: Final = calls(RUN)  # run_at(address, arguments of `run_series`)
 EVENT_NAMES: Final = ("stick", "slip", "velocity reversal", "estimate reversal")
 
 
@@ -31,7 +40,12 @@ def is_analytic(parameters: FloatArray) -> bool:
     return others == 0
 
 
-@compiled
+def run_for(parameters: FloatArray) -> int:
+    """Address of the kernel that integrates a loop with these parameters (6, 16)."""
+    return address_of(run_series if is_analytic(parameters) else run_dormand_prince, RUN)
+
+
+@owning
 def begin(parameters: FloatArray, state: FloatArray, signs: Signs, contact: Signs) -> None:
     """The mode in which a state starts, into `signs` and `contact` (2,).
 
@@ -45,7 +59,7 @@ def begin(parameters: FloatArray, state: FloatArray, signs: Signs, contact: Sign
             signs[i] = 0
         return
     on = surfaces()
-    rate = np.empty(state.size)
+    rate = np.empty(2 * state.size)
     for i in range(signs.size):
         signs[i] = 1 if switching_value(on, i, state) >= 0.0 else -1
     for i in range(signs.size):
@@ -69,7 +83,7 @@ def name_events(surfaces_met: Signs, modes: Signs, moving: int) -> None:
         moving = after
 
 
-@compiled
+@owning
 def run_series(
     parameters: FloatArray,
     tolerance: float,
@@ -92,10 +106,13 @@ def run_series(
     """`integrate` by Taylor series; the arguments are its `Settings` and its `Record`, one by one."""
     settings = Settings(tolerance, end, step_limit, section, section_side, returns)
     record = Record(times, states, event_times, event_surfaces, event_signs, event_states)
-    return integrate(TAYLOR, SYSTEM, surfaces(), parameters, settings, time, state, signs, contact, record)
+    memory = np.empty(memory_shape(state.size, signs.size))
+    return integrate(
+        TAYLOR, SYSTEM, surfaces(), parameters, settings, time, state, signs, contact, record, memory
+    )
 
 
-@compiled
+@owning
 def run_dormand_prince(
     parameters: FloatArray,
     tolerance: float,
@@ -118,6 +135,7 @@ def run_dormand_prince(
     """`integrate` by Dormand and Prince's method; arguments as for `run_series`."""
     settings = Settings(tolerance, end, step_limit, section, section_side, returns)
     record = Record(times, states, event_times, event_surfaces, event_signs, event_states)
+    memory = np.empty(memory_shape(state.size, signs.size))
     return integrate(
-        DORMAND_PRINCE, SYSTEM, surfaces(), parameters, settings, time, state, signs, contact, record
+        DORMAND_PRINCE, SYSTEM, surfaces(), parameters, settings, time, state, signs, contact, record, memory
     )

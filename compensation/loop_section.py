@@ -9,14 +9,8 @@ from typing import Final
 import numpy as np
 
 from compensation.closed_loop import ClosedLoop
-from compensation.loop_returns import (
-    MOST_HALTS,
-    derivative_by_dormand_prince,
-    derivative_by_series,
-    returns_by_dormand_prince,
-    returns_by_series,
-)
-from compensation.loop_runs import is_analytic
+from compensation.loop_returns import MOST_HALTS, carry_for, derivative, returns
+from compensation.loop_runs import is_analytic, run_for
 from compensation.loop_tables import mode_parameters
 from compensation.orbits.periodic_orbits import Returns
 from ident.model.friction import StribeckFriction
@@ -61,8 +55,10 @@ class LoopSection:
     def follow_state(self, state: FloatArray, count: int) -> Returns:
         """The next returns after any state (3,)."""
         rows = np.empty((count, 5))
-        kernel = returns_by_series if self.by_series else returns_by_dormand_prince
-        made, reason = kernel(self._parameters, self.symmetric, self._tolerance, PATIENCE, state, rows)
+        parameters = self._parameters
+        made, reason = returns(
+            run_for(parameters), parameters, self.symmetric, self._tolerance, PATIENCE, state, rows
+        )
         rows = rows[:made]
         return Returns(rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], END_REASONS[reason])
 
@@ -70,11 +66,12 @@ class LoopSection:
         """Derivative (2, 2) of one return from a point (2,)."""
         state = _state(point)
         slope = np.eye(2)
+        run, carried = run_for(self._parameters), carry_for(self._parameters)
+        accuracy = (self._tolerance, self._tolerance, PATIENCE)
         for _ in range(MOST_HALTS):
             before = state[0]
             once = np.empty((2, 2))
-            kernel = derivative_by_series if self.by_series else derivative_by_dormand_prince
-            _, reason = kernel(self._parameters, self._tolerance, self._tolerance, PATIENCE, state, once)
+            _, reason = derivative(run, carried, self._parameters, *accuracy, state, once)
             if reason != SECTION:
                 return None
             slope = once @ slope

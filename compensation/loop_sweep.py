@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 
 from compensation.loop_modes import POSITION
-from compensation.loop_returns import MOST_HALTS, derivative_by_series, returns_by_series
-from ident.simulation.compiled import compiled
+from compensation.loop_returns import MOST_HALTS, derivative, returns
+from ident.simulation.compiled import compiled, owning
 from ident.simulation.filippov_system import FloatArray, Signs
 from ident.simulation.integrate import SECTION
 
@@ -29,8 +29,10 @@ MOST_RETURNS: Final = 8
 TANGENT_TOLERANCE: Final = 1e-9  # of a step of the derivative, against the multipliers' absolute 1e-8
 
 
-@compiled
+@owning
 def sweep(
+    run: int,
+    carried: int,
     tables: FloatArray,
     symmetric: bool,
     tolerance: float,
@@ -42,7 +44,7 @@ def sweep(
 ) -> None:
     """The cycle at each of n values, from the one before or else from `cold` (2,): rows (n, COLUMNS).
 
-    The first value starts from `first` (2,).
+    The first value starts from `first` (2,). `run` and `carried` are the addresses of the loop's kernels.
 
     `tables` (n, 6, 16) are the parameters of `loop_parameters`; verdicts (n,) are those named above. The
     sweep ends at the first value that stays undecided.
@@ -59,14 +61,23 @@ def sweep(
                 guess[i] = rows[value - 1, i]
             if warm and known == 2:
                 guess[i] += rows[value - 1, i] - rows[value - 2, i]
-        verdicts[value] = cycle_from(tables[value], symmetric, tolerance, patience, guess, rows[value])
+        verdicts[value] = cycle_from(
+            run, carried, tables[value], symmetric, tolerance, patience, guess, rows[value]
+        )
         if verdicts[value] == UNDECIDED:
             return
 
 
-@compiled
+@owning
 def cycle_from(
-    table: FloatArray, symmetric: bool, tolerance: float, patience: float, start: FloatArray, row: FloatArray
+    run: int,
+    carried: int,
+    table: FloatArray,
+    symmetric: bool,
+    tolerance: float,
+    patience: float,
+    start: FloatArray,
+    row: FloatArray,
 ) -> int:
     """The cycle of one return that a point (2,) of the section leads to, into `row`; the verdict."""
     state, once, points = np.empty(3), np.empty((2, 2)), np.empty((1, 5))
@@ -76,7 +87,7 @@ def cycle_from(
         state[0], state[1], state[2] = here[0], here[1], -here[1]
         size = max(abs(here[0]), abs(here[1]))
         if before <= DEFINITE * size:
-            if _turn(table, symmetric, patience, tolerance, state, once, row) != SECTION:
+            if _turn(run, carried, table, symmetric, patience, tolerance, state, once, row) != SECTION:
                 return LEADS_ELSEWHERE
             before = max(abs(row[X1] - here[0]), abs(row[X2] - here[1]))
             if before <= REPEATS * size:
@@ -84,7 +95,7 @@ def cycle_from(
                 return FOUND
             here[0], here[1] = row[X1], row[X2]
         else:
-            made, _ = returns_by_series(table, symmetric, tolerance, patience, state, points)
+            made, _ = returns(run, table, symmetric, tolerance, patience, state, points)
             if made == 0:
                 return LEADS_ELSEWHERE
             before = max(abs(points[0, 0] - here[0]), abs(points[0, 1] - here[1]))
@@ -92,8 +103,10 @@ def cycle_from(
     return UNDECIDED
 
 
-@compiled
+@owning
 def _turn(
+    run: int,
+    carried: int,
     table: FloatArray,
     symmetric: bool,
     patience: float,
@@ -109,7 +122,9 @@ def _turn(
         row[SLOPE + i] = 1.0 if i in (0, 3) else 0.0
     for _ in range(MOST_HALTS):
         begun = state[POSITION]
-        duration, reason = derivative_by_series(table, tolerance, TANGENT_TOLERANCE, patience, state, once)
+        duration, reason = derivative(
+            run, carried, table, tolerance, TANGENT_TOLERANCE, patience, state, once
+        )
         if reason != SECTION:
             return reason
         period += duration

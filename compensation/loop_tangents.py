@@ -10,8 +10,6 @@ from __future__ import annotations
 from math import exp, expm1
 from typing import Final
 
-import numpy as np
-
 from compensation.loop_modes import field
 from compensation.loop_parameters import (
     A1,
@@ -32,13 +30,13 @@ from compensation.loop_parameters import (
     WIDTH2,
     WIDTHV,
 )
-from compensation.loop_series import series
+from compensation.loop_series import fadings, series
 from ident.simulation.compiled import compiled, passed
 from ident.simulation.filippov_system import FilippovSystem, FloatArray, Signs, no_slide, no_slide_at
+from ident.simulation.packs import fused, number_of, pack_at, packed, place_pack, spread
 
 STATES: Final = 3
 DEVIATIONS: Final = 2
-SERIES_ROWS: Final = 5  # rows of `work` that the series of the states takes, and of each deviation
 
 
 @compiled
@@ -84,45 +82,38 @@ def tangent_series(
 ) -> float:
     """Taylor coefficients of the state and of two deviations into rows 0..8, all shapes 1."""
     reach = series(signs, state[:STATES], parameters, order, coefficients, work)
-    k = parameters[(2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)]
-    a1, a2, a3, k2, kv = k[A1], k[A2], k[A3], k[K2], k[KV]
-    c1, c2, gain = k[C1], k[C2], k[GAIN]
-    alike = k[ALIKE] != 0.0
-    shared = 1.0 if alike else 0.0
-    d2, d3, dv, e, w = work[0], work[1], work[2], work[3], work[4]
-    rate2, ratev = -k[SIGN2] / k[WIDTH2], -k[SIGNV] / k[WIDTHV]
+    mode = (2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)
+    a1, a2, a3 = parameters[mode, A1], parameters[mode, A2], parameters[mode, A3]
+    c1, c2, gain = parameters[mode, C1], parameters[mode, C2], parameters[mode, GAIN]
+    k2, kv, shared = parameters[mode, K2], parameters[mode, KV], parameters[mode, ALIKE]
+    rate2 = -parameters[mode, SIGN2] / parameters[mode, WIDTH2]
+    ratev = -parameters[mode, SIGNV] / parameters[mode, WIDTHV]
+    faded = fadings(order)
     for d in range(1, 1 + DEVIATIONS):
         s = STATES * d
-        p1, p2, p3 = coefficients[s], coefficients[s + 1], coefficients[s + 2]
-        own = work[SERIES_ROWS * d :]
-        t2, t3, tv, te, tw = own[0], own[1], own[2], own[3], own[4]
-        p1[0], p2[0], p3[0] = state[s], state[s + 1], state[s + 2]
-        te[0] = rate2 * e[0] * p2[0]
-        if alike:
-            tw[0] = ratev * (w[0] * (p2[0] + p3[0]) + e[0] * p3[0])
-        else:
-            tw[0] = ratev * w[0] * (p2[0] + p3[0])
+        rates, fades = 2 * faded * d, 2 * faded * d + faded  # where those of the deviation begin in `work`
+        x1, x2, x3 = state[s], state[s + 1], state[s + 2]
+        coefficients[s, 0], coefficients[s + 1, 0], coefficients[s + 2, 0] = x1, x2, x3
+        start = pack_at(4, work, faded)
+        e = rate2 * number_of(start, 0) * x2
+        w = ratev * (number_of(start, 1) * (x2 + x3) + number_of(start, 2) * x3)
+        place_pack(work, fades, packed(e, w, shared * e, 0.0))
         for i in range(order):
             step = 1.0 / (i + 1)
-            two = c1 * p1[i] + c2 * p2[i] + gain * p3[i]
-            three = a1 * p1[i] + a2 * p2[i] + a3 * p3[i] + k2 * te[i] + kv * tw[i]
-            t2[i], t3[i], tv[i] = two, three, two + three
-            p1[i + 1] = (p2[i] + p3[i]) * step
-            p2[i + 1] = two * step
-            p3[i + 1] = three * step
-            fade, fade_base = 0.0, 0.0  # every sum is a chain of its own: they do not wait for each other
-            slide, slide_base = 0.0, 0.0
-            share, share_base = 0.0, 0.0
+            two = c1 * x1 + c2 * x2 + gain * x3
+            three = a1 * x1 + a2 * x2 + a3 * x3 + k2 * e + kv * w
+            place_pack(work, rates + 4 * i, packed(two, two + three, three, 0.0))
+            x1, x2, x3 = (x2 + x3) * step, two * step, three * step
+            coefficients[s, i + 1], coefficients[s + 1, i + 1], coefficients[s + 2, i + 1] = x1, x2, x3
+            own, base = spread(4, 0.0), spread(4, 0.0)
             for ahead in range(i + 1):
-                j, back = np.uint64(ahead), np.uint64(i - ahead)
-                fade += t2[j] * e[back]
-                slide += tv[j] * w[back]
-                share += t3[j] * e[back]
-                fade_base += d2[j] * te[back]
-                slide_base += dv[j] * tw[back]
-                share_base += d3[j] * te[back]
-            te[i + 1] = rate2 * step * (fade + fade_base)
-            tw[i + 1] = ratev * step * ((slide + slide_base) + shared * (share + share_base))
+                at, back = 4 * ahead, 4 * (i - ahead)
+                own = fused(pack_at(4, work, rates + at), pack_at(4, work, faded + back), own)
+                base = fused(pack_at(4, work, at), pack_at(4, work, fades + back), base)
+            both = own + base
+            e = rate2 * step * number_of(both, 0)
+            w = ratev * step * (number_of(both, 1) + number_of(both, 2))
+            place_pack(work, fades + 4 * i + 4, packed(e, w, shared * e, 0.0))
     return reach
 
 

@@ -1,4 +1,7 @@
-"""Many trajectories of the closed loop at once: arrays of starts and gains, on all cores.
+"""Many trajectories of the closed loop at once: arrays of starts and gains, side by side and on all cores.
+
+Where the modes have Taylor series, eight trajectories go side by side in the lanes of packs
+(`simulation.lanes`); others go one by one.
 
 Neighbouring trajectories cost alike, and their cost changes along a sorted gain: part p of P takes every P-th
 from the p-th on, so that all parts end together. A part is one compiled call that releases the interpreter
@@ -15,14 +18,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.closed_loop import STEP_LIMIT, ClosedLoop, checked_times
-from compensation.loop_runs import begin, is_analytic, run_dormand_prince, run_series
+from compensation.loop_lanes import LOOP_LANES
+from compensation.loop_modes import surfaces
+from compensation.loop_parameters import COLUMNS
+from compensation.loop_runs import begin, is_analytic, run_at, run_for
 from compensation.loop_tables import gain_row, tables_over_gains
 from ident.model.friction import ModelError
-from ident.simulation.compiled import compiled
+from ident.simulation.compiled import compiled, owning, passed
 from ident.simulation.filippov_system import FloatArray, Signs
-from ident.simulation.integrate import END_REASONS
+from ident.simulation.integrate import END_REASONS, Progress
+from ident.simulation.lanes import LANES, Batch, integrate_side_by_side, lanes_of, table_of
 
 STATES: Final = 3
+SURFACES: Final = 2
 
 
 class MapParts(Protocol):
@@ -69,7 +77,7 @@ def simulate_many(
     ModelError
         If starts, gains, times or tolerance are no numbers, have no fitting shape or run backwards.
     """
-    first = np.array(starts, dtype=np.float64)
+    first = np.array(starts, dtype=np.float64, order="C")
     if first.ndim != 2 or first.shape[1] != STATES or not np.isfinite(first).all():
         raise ModelError(f"starts of shape {first.shape}: finite numbers of shape (n, 3) are needed (eq 8)")
     rows = np.asarray(gain_row(loop.controller)[np.newaxis] if gains is None else gains, dtype=np.float64)
@@ -80,13 +88,16 @@ def simulate_many(
     if not (0 < duration < np.inf and 0 < tolerance < 1):
         raise ModelError(f"duration {duration} s, tolerance {tolerance}: positive, the tolerance below 1")
     tables = tables_over_gains(loop.robot, loop.controller, rows)
+    runs = np.array([run_for(tables[0])])  # the laws, and so the method, are the same for all
     wanted = checked_times(times, duration)
     count = first.shape[0]
     states = np.full((count, wanted.size, STATES), np.nan)
     end_times, reasons = np.empty(count), np.empty(count, np.int64)
 
+    follow = run_side_by_side if is_analytic(tables[0]) and count >= parts * LANES else run_every
+
     def run_part(part: int) -> None:
-        run_every(tables, part, parts, tolerance, duration, first, wanted, states, end_times, reasons)
+        follow(runs, tables, part, parts, tolerance, duration, first, wanted, states, end_times, reasons)
 
     for _ in map_parts(run_part, range(parts)):
         pass
@@ -94,7 +105,34 @@ def simulate_many(
 
 
 @compiled
-def run_every(
+def _go_on(
+    run: int,
+    batch: Batch,
+    index: int,
+    tolerance: float,
+    end: float,
+    steps: int,
+    time: float,
+    output: int,
+) -> Progress:
+    """One trajectory of a batch by itself, `integrate`; none of its events are kept."""
+    now: Progress = run_at(
+        run,
+        (
+            batch.tables[table_of(batch, index)], tolerance, end, steps, -1, 0, 0, time, batch.states[index],
+            batch.signs[index], batch.contacts[index], batch.times[output:], batch.wanted[index, output:],
+            batch.times[:0], batch.signs[index, :0], batch.signs[:0], batch.states[:0],
+        ),
+    )  # fmt: skip
+    return now
+
+
+GO_ON: Final = passed(_go_on)
+
+
+@owning
+def run_side_by_side(
+    runs: Signs,
     tables: FloatArray,
     part: int,
     parts: int,
@@ -106,21 +144,58 @@ def run_every(
     end_times: FloatArray,
     reasons: Signs,
 ) -> None:
-    """Trajectories `part`, `part` + `parts`, ...; `starts` become their ends."""
+    """As `run_every`, eight at a time, where the modes have Taylor series; `runs` (1,)."""
+    count = starts.shape[0]
+    signs, contacts = np.zeros((count, SURFACES), np.int64), np.zeros((count, SURFACES), np.int64)
+    batch = Batch(tables, times, states, starts, signs, contacts, end_times, reasons)
+    for i in range(part, count, parts):
+        begin(tables[table_of(batch, i)], starts[i], signs[i], contacts[i])
+    at, memory = lanes_of(STATES, SURFACES, COLUMNS)
+    integrate_side_by_side(
+        LOOP_LANES,
+        GO_ON,
+        runs[0],
+        surfaces(),
+        batch,
+        at,
+        memory,
+        part,
+        parts,
+        tolerance,
+        duration,
+        STEP_LIMIT,
+    )
+
+
+@owning
+def run_every(
+    runs: Signs,
+    tables: FloatArray,
+    part: int,
+    parts: int,
+    tolerance: float,
+    duration: float,
+    starts: FloatArray,
+    times: FloatArray,
+    states: FloatArray,
+    end_times: FloatArray,
+    reasons: Signs,
+) -> None:
+    """Trajectories `part`, `part` + `parts`, ...; `starts` become their ends.
+
+    `runs` are addresses of the kernels of `loop_runs`, one for all or one for each.
+    """
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     at, which = np.empty(0), np.empty(0, np.int64)
     modes, where = np.empty((0, 2), np.int64), np.empty((0, STATES))
     for i in range(part, starts.shape[0], parts):
         table = tables[min(i, tables.shape[0] - 1)]
         begin(table, starts[i], signs, contact)
-        if is_analytic(table):
-            end = run_series(
+        end = run_at(
+            runs[min(i, runs.size - 1)],
+            (
                 table, tolerance, duration, STEP_LIMIT, -1, 0, 0, 0.0, starts[i], signs, contact,
                 times, states[i], at, which, modes, where,
-            )  # fmt: skip
-        else:
-            end = run_dormand_prince(
-                table, tolerance, duration, STEP_LIMIT, -1, 0, 0, 0.0, starts[i], signs, contact,
-                times, states[i], at, which, modes, where,
-            )  # fmt: skip
+            ),
+        )  # fmt: skip
         end_times[i], reasons[i] = end.time, end.reason

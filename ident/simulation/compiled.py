@@ -6,9 +6,12 @@ of everything that a kernel reaches by name: the source files of all kernels tha
 through others, and the values of the constants that they use. The digest is taken when a signature is
 compiled or loaded, so the order of definitions does not matter.
 
-Two decorators:
+Three decorators:
 
-- `compiled` for kernels with plain arguments (numbers, arrays). The machine code is kept on disk.
+- `compiled` for kernels with plain arguments (numbers, arrays). The machine code is kept on disk. They work
+  on memory that they are given, and do not count references to it, which is dear: two atomic operations an
+  array and call.
+- `owning` for kernels that make arrays of their own.
 - `specialised` for kernels that take compiled functions as arguments, such as an integrator that takes a
   vector field. They are compiled into the `compiled` kernel that calls them and are cached with it, not
   by themselves: numba identifies a function argument by the process that made it.
@@ -16,6 +19,10 @@ Two decorators:
 A function argument is given as `passed(kernel)`. Its type alone says which function it is; it has no
 value at run time. (numba's own function arguments carry the address of a Python object, which no cache
 can keep.)
+
+A kernel that calls another one holds a copy of its machine code, optimised again with it. Where the callee
+is an integrator that takes seconds to compile, the caller takes its address instead: `address_of` gives
+it for a signature, once a process, and `calls(signature)` makes the function that calls what is there.
 
 Both follow IEEE arithmetic to the letter (no fused or reordered operations, division by zero gives inf or
 nan): some invariants of the systems solved here hold bit for bit. Both release the interpreter lock.
@@ -32,33 +39,49 @@ from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
+from llvmlite import ir
+from numba.core import cgutils
 from numba.core import types as numba_types
 from numba.core.caching import FunctionCache
 from numba.core.datamodel.models import OpaqueModel
 from numba.core.datamodel.registry import register_default
 from numba.core.dispatcher import Dispatcher
 from numba.core.imputils import lower_constant
+from numba.core.typing.templates import Signature
 from numba.core.typing.typeof import typeof_impl
+from numba.extending import intrinsic
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
+# options that numba's documentation does not list, but for the first two
+_OWNING: dict[str, Any] = {"error_model": "numpy", "nogil": True}
+_BORROWING: dict[str, Any] = {**_OWNING, "_nrt": False}
+_UNWRAPPED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
 
 def compiled(function: Callable[P, R]) -> Callable[P, R]:
     """Compile `function` at its first call with given types; the result is cached on disk."""
-    kernel = numba.njit(error_model="numpy", nogil=True)(function)
-    kernel._cache = _ReachingCache(function)  # type: ignore[attr-defined]  # numba has no public way to choose a cache
-    return kernel
+    return _cached(numba.njit(**_BORROWING)(function), function)
+
+
+def owning(function: Callable[P, R]) -> Callable[P, R]:
+    """As `compiled`, for a kernel that makes arrays of its own."""
+    return _cached(numba.njit(**_OWNING)(function), function)
 
 
 def specialised(function: Callable[P, R]) -> Callable[P, R]:
-    """Compile `function` into each kernel that calls it; its arguments may be compiled functions."""
-    return numba.njit(error_model="numpy", nogil=True)(function)
+    """Compile `function` into each kernel that calls it; its arguments may be compiled functions.
+
+    It gets no wrapper to be called from Python by, which would take as long to compile as a short kernel.
+    """
+    kernel: Callable[P, R] = numba.njit(**_BORROWING, **_UNWRAPPED)(function)
+    return kernel
 
 
-def inlined(function: Callable[P, R]) -> Callable[P, R]:
-    """As `specialised`, for a thin layer that is not worth machine code of its own."""
-    return numba.njit(error_model="numpy", nogil=True, inline="always")(function)
+def _cached(kernel: Any, function: Callable[P, R]) -> Callable[P, R]:
+    kernel._cache = _ReachingCache(function)  # numba has no public way to choose a cache
+    return cast("Callable[P, R]", kernel)
 
 
 def passed(kernel: Callable[P, R]) -> Callable[P, R]:
@@ -89,6 +112,38 @@ def _type_of_passed(value: _Passed, _context: object) -> _PassedType:
 @lower_constant(_PassedType)  # type: ignore[no-untyped-call, untyped-decorator]  # numba leaves its lowering untyped
 def _passed_at_run_time(context: Any, _builder: object, _type: object, _value: object) -> Any:
     return context.get_dummy_value()
+
+
+@cache
+def address_of(kernel: Callable[..., Any], signature: Signature) -> int:
+    """Where the machine code of a kernel is in this process; it is compiled or loaded if need be."""
+    made: Any = cast("Dispatcher[Callable[..., Any]]", kernel).get_compile_result(signature)
+    address: int = made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
+    return address
+
+
+def calls(signature: Signature) -> Callable[[int, tuple[Any, ...]], Any]:
+    """call(address, arguments): the kernel of this signature at an `address_of` it, for use in kernels."""
+
+    @intrinsic
+    def call(_typing_context: Any, address: Any, arguments: Any) -> Any:
+        def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+            given = cgutils.unpack_tuple(builder, values[1])  # type: ignore[no-untyped-call]
+            cast_to = zip(given, sig.args[1].types, signature.args, strict=True)
+            passed_on = [context.cast(builder, value, have, want) for value, have, want in cast_to]
+            convention = context.call_conv
+            kind = convention.get_function_type(signature.return_type, signature.args)
+            callee = builder.inttoptr(values[0], ir.PointerType(kind))
+            status, result = convention.call_function(
+                builder, callee, signature.return_type, signature.args, passed_on
+            )
+            with cgutils.if_unlikely(builder, status.is_error):  # type: ignore[no-untyped-call]
+                convention.return_status_propagate(builder, status)
+            return result
+
+        return signature.return_type(address, arguments), generate
+
+    return cast("Callable[[int, tuple[Any, ...]], Any]", call)
 
 
 class _ReachingCache(FunctionCache):

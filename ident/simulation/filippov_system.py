@@ -112,7 +112,7 @@ def leaving_rate(
     parameters: FloatArray,
     rate: FloatArray,
 ) -> float:
-    """dh_index/dt on one side of the surface; `rate` is memory (n,)."""
+    """dh_index/dt on one side of the surface; `rate` is memory (>= n,)."""
     before = signs[index]
     signs[index] = side
     system.field(signs, state, parameters, rate)
@@ -136,7 +136,8 @@ def resolve(
 ) -> int:
     """Side to which a state on surface `index` goes, 0 if it slides: Filippov's rule. No other sign is 0.
 
-    Where both rates vanish the next derivative decides, by a short step along the field.
+    Where both rates vanish the next derivative decides, by a short step along the field. `rate` is memory
+    (2 n,).
     """
     plus = leaving_rate(system, surfaces, index, 1, signs, state, parameters, rate)
     minus = leaving_rate(system, surfaces, index, -1, signs, state, parameters, rate)
@@ -149,9 +150,9 @@ def resolve(
     if plus == 0.0 and minus == 0.0:
         for side in (1, -1):
             leaving_rate(system, surfaces, index, side, signs, state, parameters, rate)
-            ahead = np.empty(state.size)
             for j in range(state.size):
-                ahead[j] = state[j] + TANGENT_STEP * rate[j]
+                rate[state.size + j] = state[j] + TANGENT_STEP * rate[j]
+            ahead = rate[state.size : 2 * state.size]
             if side * leaving_rate(system, surfaces, index, side, signs, ahead, parameters, rate) > 0.0:
                 return side
     return 0

@@ -50,7 +50,7 @@ END_REASONS: Final = (
     "not finite",
 )
 
-WORK_ROWS: Final = 20
+WORK_ROWS: Final = 24
 STALLED_EVENTS: Final = 200  # events at one instant, after which the step limit is declared reached
 HELD_EVENTS: Final = (
     50  # events at one instant, after which a slide is held on for a little: rounding drives them
@@ -104,16 +104,18 @@ def integrate(
     signs: Signs,
     contact: Signs,
     record: Record,
+    memory: FloatArray,
 ) -> Progress:
     """Advance `state` (n,), `signs` (m,) and `contact` (m,) in place from `time` to the end of the settings.
+
+    `memory` is of the shape that `memory_shape` tells.
 
     Output times before `time` are left alone. A state that slides for ever is reported as an equilibrium at
     once, with its later outputs filled in; `state` is then where it tends to.
     """
     n, m = state.size, signs.size
-    polynomials = np.empty((n + m, ORDER + 1))
-    work = np.empty((WORK_ROWS, max(n, ORDER + 1)))
-    after, rate, spread = np.empty(n), np.empty(n), np.empty(n)
+    polynomials, work = memory[: n + m], memory[n + m : n + m + WORK_ROWS]
+    after, rate, spread = memory[-3, :n], memory[-2], memory[-1, :n]
     wanted = record.times.size
     output = 0
     while output < wanted and record.times[output] < time:
@@ -211,6 +213,12 @@ def integrate(
 
 
 @compiled
+def memory_shape(n: int, m: int) -> tuple[int, int]:
+    """Shape of the memory that an integration of n states with m surfaces needs."""
+    return n + m + WORK_ROWS + 3, max(2 * n, ORDER + 1)
+
+
+@compiled
 def _slides(signs: Signs) -> bool:
     sliding = 0
     for i in range(signs.size):
@@ -223,12 +231,11 @@ def _slides(signs: Signs) -> bool:
 def _sum_up(polynomials: FloatArray, n: int, degree: int, end: FloatArray, spread: FloatArray) -> None:
     """Values (n,) at the end of a step, and the furthest (n,) that they can be from its beginning."""
     for i in range(n):
-        row = polynomials[i]
         value, bound = 0.0, 0.0
         for k in range(degree, 0, -1):
-            value += row[k]
-            bound += abs(row[k])
-        end[i] = value + row[0]
+            value += polynomials[i, k]
+            bound += abs(polynomials[i, k])
+        end[i] = value + polynomials[i, 0]
         spread[i] = bound
 
 

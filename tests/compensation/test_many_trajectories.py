@@ -10,8 +10,9 @@ from compensation.closed_loop import ClosedLoop, simulate
 from compensation.controller import Controller, Gains
 from compensation.loop_section import with_gain
 from compensation.many_trajectories import simulate_many
-from ident.model.friction import ModelError, StribeckFriction
+from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.published import symmetric_robot
+from ident.model.robot import OneLinkRobot
 
 GAINS = Gains(proportional=0.4, derivative=0.02, observer=73.5, compensation=1.1)
 LOOP = ClosedLoop(symmetric_robot(), Controller(GAINS, symmetric_robot()))
@@ -33,6 +34,45 @@ def test_parts_do_not_matter(parts: int) -> None:
         np.testing.assert_array_equal(many.end_state[i], alone.end_state)
         assert many.end_reasons[i] == alone.end_reason
         assert many.end_time[i] == alone.end_time
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_side_by_side_they_are_what_they_are_alone(seed: int) -> None:
+    """Lanes take other steps than a trajectory alone: the same to what a tolerance of 1e-12 leaves."""
+    random = np.random.default_rng(seed)
+    curves = [
+        StribeckCurve(
+            static_torque=coulomb + float(random.uniform(0.0, 0.3)),
+            coulomb_torque=coulomb,
+            stribeck_velocity=float(random.uniform(0.02, 0.2)),
+            stribeck_shape=1.0,
+            viscous_damping=float(random.uniform(0.0, 0.2)),
+        )
+        for coulomb in random.uniform(0.1, 0.6, 4).tolist()
+    ]
+    robot = OneLinkRobot(0.03, StribeckFriction(*curves[:2]))
+    model = robot if seed == 0 else OneLinkRobot(0.05, StribeckFriction(*curves[2:]))
+    loop = ClosedLoop(robot, Controller(GAINS, model))
+    count = 41
+    gains = np.tile(ROWS[:1], (count, 1))
+    gains[:, 2], gains[:, 3] = random.uniform(20.0, 150.0, count), np.linspace(0.0, 1.2, count)
+    starts = random.normal(size=(count, 3)) * [0.7, 1.0, 0.3]
+    starts[:3] = [[0.5, 0.0, 0.0], [0.0, 0.0, 0.0], [0.001, 0.2, -0.2]]
+    many = simulate_many(loop, starts, duration=3.0, times=TIMES[:7], gains=gains, tolerance=1e-12, parts=2)
+    for i, row in enumerate(gains.tolist()):
+        itself = ClosedLoop(robot, Controller(Gains(*row), model))
+        alone = simulate(itself, starts[i], duration=3.0, times=TIMES[:7], tolerance=1e-12)
+        assert many.end_reasons[i] == alone.end_reason
+        np.testing.assert_allclose(many.state[i], alone.state, rtol=0.0, atol=2e-9)
+        np.testing.assert_allclose(many.end_state[i], alone.end_state, rtol=0.0, atol=2e-9)
+        assert many.end_time[i] == pytest.approx(alone.end_time, abs=1e-8)
+
+
+def test_side_by_side_no_observer_error_appears_where_there_is_none() -> None:
+    starts = np.column_stack([np.linspace(-1.0, 1.0, 16), np.zeros(16), np.zeros(16)])
+    gains = np.tile([0.4, 0.02, 40.0, 1.0], (16, 1))
+    many = simulate_many(LOOP, starts, duration=5.0, times=TIMES, gains=gains)
+    assert np.all(many.state[:, :, 2] == 0.0)
 
 
 def test_one_controller_and_another_shape() -> None:

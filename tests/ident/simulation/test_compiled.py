@@ -27,6 +27,20 @@ def top(x):
 print(top(1.0), sum(top.stats.cache_hits.values()))
 """
 
+BY_ADDRESS = """
+import warnings
+warnings.simplefilter("error")
+from numba import float64
+from ident.simulation.compiled import address_of, calls, compiled
+from low import scaled
+SIGNATURE = float64(float64)
+call = calls(SIGNATURE)
+@compiled
+def top(address, x):
+    return call(address, (x,)) + 1.0
+print(top(address_of(scaled, SIGNATURE), 1.0), sum(top.stats.cache_hits.values()))
+"""
+
 
 def run(folder: Path) -> tuple[float, int]:
     root = Path(__file__).parents[3]
@@ -45,3 +59,14 @@ def test_a_second_process_loads_and_an_edit_of_a_called_module_recompiles(tmp_pa
     assert run(tmp_path) == (3.0, 1)
     (tmp_path / "low.py").write_text(LOW.format(scale=5.0))
     assert run(tmp_path) == (6.0, 0)
+
+
+def test_a_kernel_called_by_its_address_is_never_stale_and_its_caller_not_compiled_again(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "high.py").write_text(BY_ADDRESS)
+    (tmp_path / "low.py").write_text(LOW.format(scale=2.0))
+    assert run(tmp_path) == (3.0, 0)
+    assert run(tmp_path) == (3.0, 1)
+    (tmp_path / "low.py").write_text(LOW.format(scale=5.0))
+    assert run(tmp_path) == (6.0, 1)

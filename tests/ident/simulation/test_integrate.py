@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import quad
 
-from ident.simulation.compiled import compiled, passed
+from ident.simulation.compiled import compiled, owning, passed
 from ident.simulation.dormand_prince import DORMAND_PRINCE
 from ident.simulation.filippov_system import (
     FilippovSystem,
@@ -22,7 +22,15 @@ from ident.simulation.filippov_system import (
     no_slide,
     no_slide_at,
 )
-from ident.simulation.integrate import EQUILIBRIUM, TIME_REACHED, Progress, Record, Settings, integrate
+from ident.simulation.integrate import (
+    EQUILIBRIUM,
+    TIME_REACHED,
+    Progress,
+    Record,
+    Settings,
+    integrate,
+    memory_shape,
+)
 from ident.simulation.taylor import TAYLOR
 
 MU: Final = 0.1
@@ -60,20 +68,20 @@ ROWS = np.array([[0.0, 1.0, 0.0]])
 PIVOTS = np.array([1])
 
 
-@compiled
+@owning
 def by_series(
     mu: FloatArray, settings: Settings, state: FloatArray, signs: Signs, contact: Signs, record: Record
 ) -> Progress:
-    return integrate(TAYLOR, SYSTEM, Surfaces(ROWS, PIVOTS), mu, settings, 0.0, state, signs, contact, record)
+    on, memory = Surfaces(ROWS, PIVOTS), np.full(memory_shape(2, 1), np.nan)
+    return integrate(TAYLOR, SYSTEM, on, mu, settings, 0.0, state, signs, contact, record, memory)
 
 
-@compiled
+@owning
 def by_dormand_prince(
     mu: FloatArray, settings: Settings, state: FloatArray, signs: Signs, contact: Signs, record: Record
 ) -> Progress:
-    return integrate(
-        DORMAND_PRINCE, SYSTEM, Surfaces(ROWS, PIVOTS), mu, settings, 0.0, state, signs, contact, record
-    )
+    on, memory = Surfaces(ROWS, PIVOTS), np.full(memory_shape(2, 1), np.nan)
+    return integrate(DORMAND_PRINCE, SYSTEM, on, mu, settings, 0.0, state, signs, contact, record, memory)
 
 
 def exact(time: FloatArray, start: float) -> tuple[NDArray[np.float64], float, float]:
@@ -154,13 +162,12 @@ def braking_field(signs: Signs, state: FloatArray, parameters: FloatArray, out: 
 BRAKING = FilippovSystem(passed(braking_field), passed(no_series), passed(no_slide), passed(no_slide_at))
 
 
-@compiled
+@owning
 def brake(
     width: FloatArray, settings: Settings, state: FloatArray, signs: Signs, contact: Signs, record: Record
 ) -> Progress:
-    return integrate(
-        DORMAND_PRINCE, BRAKING, Surfaces(ROWS, PIVOTS), width, settings, 0.0, state, signs, contact, record
-    )
+    on, memory = Surfaces(ROWS, PIVOTS), np.full(memory_shape(2, 1), np.nan)
+    return integrate(DORMAND_PRINCE, BRAKING, on, width, settings, 0.0, state, signs, contact, record, memory)
 
 
 def lost(power: int) -> float:
