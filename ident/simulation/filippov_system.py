@@ -62,7 +62,8 @@ class OneStepMethod(NamedTuple):
     """step(system, signs, state, parameters, tolerance, longest, suggested, polynomials, work)."""
     end_at: Callable[..., tuple[float, float]]
     """end_at(system, surfaces, surface, signs, state, parameters, length, part, polynomials, work)
-    -> length and the part of it at which the event is."""
+    -> length and the part of it at which the event is. Where the step did not tell the truth there: a length,
+    negative, of the step to be taken instead."""
 
 
 class Surfaces(NamedTuple):

@@ -174,6 +174,9 @@ def integrate(
                 length, part = method.end_at(
                     system, surfaces, surface, signs, state, parameters, length, part, polynomials, work
                 )
+                if length < 0.0:
+                    suggested = -length
+                    continue
             span = part * length
             now = settings.end if span == left else time + span
             while output < wanted and record.times[output] <= now:

@@ -101,6 +101,54 @@ def test_mirrored_laws_mirror_the_motion_bit_for_bit(
     assert [event.kind for event in there.events] == [event.kind for event in here.events]
 
 
+def shaped(shape: float, width: float = 0.0) -> OneLinkRobot:
+    """The published robot with another Stribeck curve."""
+    law = symmetric_robot().friction.positive
+    law = replace(law, stribeck_shape=shape, stribeck_velocity=width or law.stribeck_velocity)
+    return replace(symmetric_robot(), friction=StribeckFriction(law, law))
+
+
+@pytest.mark.parametrize("observer", [20.0, 73.5, 200.0])
+@pytest.mark.parametrize(
+    ("shape", "r"),
+    [(0.5, 0.9), (0.7, 0.9), (1.3, 0.9), (1.3, 1.1), (1.5, 0.9), (1.5, 1.1), (1.9, 0.9), (1.9, 1.1)],
+)
+def test_a_state_between_two_steps_is_as_true_as_the_steps(shape: float, r: float, observer: float) -> None:
+    """Also where the observer's stability bounds the step. (For shapes below 1, r > 1 is ill-conditioned.)"""
+    robot = shaped(shape)
+    gains = Gains(proportional=0.4, derivative=0.02, observer=observer, compensation=r)
+    case = ClosedLoop(robot, Controller(gains, robot))
+    grid = np.linspace(0.0, 5.0, 5001)
+    tolerance = 1e-10
+    run = simulate(case, (1.0, 0.0, 0.1), duration=5.0, times=grid, tolerance=tolerance)
+    truth = simulate(case, (1.0, 0.0, 0.1), duration=5.0, times=grid, tolerance=1e-13)
+    size = float(np.max(np.abs(truth.state)))
+    np.testing.assert_allclose(run.state, truth.state, rtol=0, atol=30 * tolerance * size)
+    assert [event.kind for event in run.events] == [event.kind for event in truth.events]
+    for event, true in zip(run.events, truth.events, strict=True):
+        np.testing.assert_allclose(event.state, true.state, rtol=0, atol=10 * tolerance * size)
+
+
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-9, 1e-10])
+def test_a_fast_halt_does_not_leap_across_narrow_friction_peaks(tolerance: float) -> None:
+    """Each law peaks within v_s of v = 0 or x2 = 0, where this loop spends a millisecond."""
+
+    def law(static: float, coulomb: float, width: float, damping: float) -> StribeckCurve:
+        return StribeckCurve(static, coulomb, width, damping, 2.0)
+
+    believed = law(0.652, 0.453, 0.0408, 0.0766)
+    robot = OneLinkRobot(
+        0.0497, StribeckFriction(law(0.617, 0.34, 0.0712, 0.108), law(0.688, 0.566, 0.0104, 0.0451))
+    )
+    gains = Gains(proportional=1.49, derivative=0.00351, observer=148.0, compensation=1.19)
+    case = ClosedLoop(robot, Controller(gains, OneLinkRobot(0.0497, StribeckFriction(believed, believed))))
+    start = (3.49, -9.7, 0.893)
+    run = simulate(case, start, duration=3.0, times=[3.0], tolerance=tolerance)
+    truth = simulate(case, start, duration=3.0, times=[3.0], tolerance=1e-13)
+    assert [event.kind for event in run.events] == [event.kind for event in truth.events]
+    np.testing.assert_allclose(run.state[0], truth.state[0], rtol=0, atol=1e3 * tolerance)
+
+
 def random_loop(seed: int) -> tuple[ClosedLoop, tuple[float, float, float]]:
     random = np.random.default_rng(seed)
 

@@ -9,10 +9,19 @@ from typing import Final
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import quad
 
 from ident.simulation.compiled import compiled, owning, passed
 from ident.simulation.dormand_prince import DORMAND_PRINCE
-from ident.simulation.filippov_system import FilippovSystem, FloatArray, Signs, Surfaces
+from ident.simulation.filippov_system import (
+    FilippovSystem,
+    FloatArray,
+    Signs,
+    Surfaces,
+    no_series,
+    no_slide,
+    no_slide_at,
+)
 from ident.simulation.integrate import (
     EQUILIBRIUM,
     TIME_REACHED,
@@ -123,3 +132,61 @@ def test_without_friction_energy_is_kept(run: object) -> None:
     end = run(np.array([0.0]), Settings(1e-13, 100.0, 100_000, -1, 0, 0), state, signs, contact, none)
     assert end.reason == TIME_REACHED
     assert state == pytest.approx([np.cos(100.0), -np.sin(100.0)], abs=1e-9)
+
+
+@pytest.mark.parametrize("power", [-700, -520, 500])
+def test_steps_are_the_same_at_any_size_of_the_state(power: int) -> None:
+    """Without friction the motion scales with its start: by a power of two bit for bit."""
+    ends = []
+    for size in (1.0, 2.0**power):
+        none = Record(
+            np.empty(0), np.empty((0, 2)), np.empty(0), np.empty(0, np.int64), np.empty((0, 1), np.int64),
+            np.empty((0, 2)),
+        )  # fmt: skip
+        state, signs, contact = np.array([size, 0.0]), np.array([-1]), np.array([1])
+        end = by_dormand_prince(
+            np.array([0.0]), Settings(1e-10, 20.0, 2000, -1, 0, 0), state, signs, contact, none
+        )
+        assert end.reason == TIME_REACHED
+        ends.append((end.steps, *(state / size)))
+    assert ends[1] == ends[0]
+
+
+@compiled
+def braking_field(signs: Signs, state: FloatArray, parameters: FloatArray, out: FloatArray) -> None:
+    """A sliding mass under friction that rises steeply at low speed: v' = -sign(v) (1 + 4 exp(-(v/w)^2))."""
+    out[0] = state[1]
+    out[1] = -signs[0] * (1.0 + 4.0 * np.exp(-((state[1] / parameters[0]) ** 2)))
+
+
+BRAKING = FilippovSystem(passed(braking_field), passed(no_series), passed(no_slide), passed(no_slide_at))
+
+
+@owning
+def brake(
+    width: FloatArray, settings: Settings, state: FloatArray, signs: Signs, contact: Signs, record: Record
+) -> Progress:
+    on, memory = Surfaces(ROWS, PIVOTS), np.full(memory_shape(2, 1), np.nan)
+    return integrate(DORMAND_PRINCE, BRAKING, on, width, settings, 0.0, state, signs, contact, record, memory)
+
+
+def lost(power: int) -> float:
+    """Integral of u^power 4 exp(-u^2) / (1 + 4 exp(-u^2)): what the peak takes from the halt."""
+    value: float = quad(lambda u: u**power * 4.0 / (np.exp(u * u) + 4.0), 0.0, 7.0, epsabs=1e-14)[0]
+    return value
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-9, 1e-12])
+@pytest.mark.parametrize("width", [0.1, 0.01, 0.001, 1e-4])
+def test_a_halt_is_not_found_across_friction_that_no_stage_has_seen(width: float, tolerance: float) -> None:
+    """From v = 1 the time to halt is the integral of dv / |v'|, the way that of v dv / |v'|."""
+    state, signs, contact = np.array([0.0, 1.0]), np.array([1]), np.array([0])
+    record = Record(
+        np.empty(0), np.empty((0, 2)), np.empty(1), np.empty(1, np.int64), np.empty((1, 1), np.int64),
+        np.empty((1, 2)),
+    )  # fmt: skip
+    end = brake(np.array([width]), Settings(tolerance, 5.0, 1000, -1, 0, 0), state, signs, contact, record)
+    slack = 20.0 * tolerance + 1e-13
+    assert end.events == 1
+    assert record.event_times[0] == pytest.approx(1.0 - width * lost(0), abs=slack)
+    assert record.event_states[0] == pytest.approx([0.5 - width**2 * lost(1), 0.0], abs=slack)
