@@ -114,7 +114,7 @@ def _many(quick: bool) -> list[Row]:
     gains = np.tile(gain_row(LOOP.controller), (count, 1))
     with ThreadPoolExecutor(CORES) as threads:
 
-        def ours(tolerance: float = 1e-7) -> FloatArray:
+        def ours(tolerance: float = 1e-8) -> FloatArray:
             found: FloatArray = simulate_many(
                 LOOP, starts, duration=DURATION, times=TIMES, gains=gains, tolerance=tolerance,
                 map_parts=threads.map, parts=CORES,
