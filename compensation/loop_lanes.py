@@ -31,7 +31,7 @@ from ident.simulation.compiled import compiled, passed, specialised
 from ident.simulation.filippov_system import FloatArray, Signs
 from ident.simulation.lanes import LANES, LaneSystem
 from ident.simulation.pack_functions import exponential, exponential_less_one
-from ident.simulation.packs import chosen, fused, magnitude, pack_at, place_pack, spread
+from ident.simulation.packs import chosen, fused, magnitude, pack_at, packed, place_pack, spread
 from ident.simulation.taylor import ORDER
 
 STATES: Final = 3
@@ -112,12 +112,12 @@ def lane_series(
         by_estimate = modes[SIGN2, lane] / modes[WIDTH2, lane]
         by_velocity = modes[SIGNV, lane] / modes[WIDTHV, lane]
         estimate, velocity = states[1, lane], states[1, lane] + states[2, lane]
-        if by_estimate * estimate > ORDER or by_velocity * velocity > ORDER:
-            own = work[SERIES:]
-            for i in range(STATES):
-                for k in range(ORDER + 1):
-                    own[i, k, 0] = coefficients[i, k, lane]
-            reach[lane] = reach_of(own[:, :, 0], ORDER, -by_estimate, -by_velocity)
+        fall2, fallv = by_estimate * estimate, by_velocity * velocity
+        if max(fall2, fallv) > ORDER:
+            for k in range(ORDER):
+                own = packed(work[0, k, lane], work[2, k, lane], 0.0, 0.0)
+                place_pack(work, SERIES * ROW + 4 * k, own)
+            reach[lane] = reach_of(work[SERIES:], ORDER, -by_estimate, -by_velocity, fall2, fallv)
 
 
 @specialised

@@ -13,7 +13,8 @@ where the last is v' - x2'. The coefficients are formed once (`loop_parameters`)
 written k0 + k2 E + kv W, with E = exp(-(|x2|/v_s^)^beta^) and, in general, W =
 exp(-(|v|/v_s)^beta). Where s2 = sv and both curves bend alike (v_s^ = v_s, beta^ = beta), W is the
 difference exp(-(|v|/v_s)^beta) - E instead, formed by expm1: then x3 = 0 gives W = 0, and with r = 1 and
-equal laws x3' is exactly zero. For beta = 1 the Taylor series of a mode is a recurrence (`loop_series`).
+equal laws x3' is exactly zero. For beta = 1 and 2 the Taylor
+series of a mode is a recurrence (`loop_series`, `bell_series`).
 
 Sticking (v = 0) is linear: x1 stays, x3 = -x2, and x2 -> w = -n1 x1/(b^ + n2 + J^ L) at the rate (b^ +
 n2)/J^ + L. The torque on the link, T = -n1 x1 - n2 x2 + r F^(x2), is monotone in x2 on each side of 0,
@@ -28,6 +29,7 @@ from typing import Final
 
 import numpy as np
 
+from compensation.bell_series import bell_series
 from compensation.loop_parameters import (
     A1,
     A2,
@@ -167,8 +169,24 @@ def slide_at(signs: Signs, state: FloatArray, parameters: FloatArray, time: floa
     out[2] = -out[1]
 
 
+@compiled
+def mode_series(
+    signs: Signs,
+    state: FloatArray,
+    parameters: FloatArray,
+    order: int,
+    coefficients: FloatArray,
+    work: FloatArray,
+) -> float:
+    """Taylor coefficients in a slip mode whose shapes are 1 or 2: `FilippovSystem.series`."""
+    mode = (2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)
+    if parameters[mode, SHAPE2] == 1.0 and parameters[mode, SHAPEV] == 1.0:
+        return series(signs, state, parameters, order, coefficients, work)
+    return bell_series(signs, state, parameters, order, coefficients, work)
+
+
 SYSTEM: Final = FilippovSystem(
-    field=passed(field), series=passed(series), slide=passed(slide), slide_at=passed(slide_at)
+    field=passed(field), series=passed(mode_series), slide=passed(slide), slide_at=passed(slide_at)
 )
 SURFACE_ROWS: Final = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 1.0, 1.0, 0.0]])
 SURFACE_PIVOTS: Final = np.array([1, 2])

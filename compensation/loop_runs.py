@@ -1,8 +1,8 @@
 """The event loop compiled for the closed loop: one kernel for each one-step method, both kept on disk.
 
-Taylor series serve Stribeck shapes of 1, Dormand and Prince's method all others (`is_analytic` decides).
-Both kernels have one signature: others call the one that they are given by its address, and need not be
-compiled for each.
+Taylor series serve Stribeck shapes of 1 and 2, Dormand and Prince's method all others (`is_analytic`). Both
+kernels have one signature: others call the one that they are given by its address, and need not be compiled
+for each.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 from numba import float64, int64, types
 
+from compensation.bell_series import BELL
 from compensation.loop_modes import MOTION, SYSTEM, surfaces
 from compensation.loop_parameters import SHAPE2, SHAPEV
 from ident.simulation.compiled import address_of, calls, compiled, owning
@@ -33,11 +34,23 @@ EVENT_NAMES: Final = ("stick", "slip", "velocity reversal", "estimate reversal")
 
 @compiled
 def is_analytic(parameters: FloatArray) -> bool:
-    """Whether every slip mode has a Taylor recurrence."""
+    """Whether every slip mode has a Taylor recurrence: all Stribeck shapes are 1 or 2."""
+    return _only_shapes(parameters, 1.0, BELL)
+
+
+@compiled
+def is_exponential(parameters: FloatArray) -> bool:
+    """Whether all Stribeck shapes are 1."""
+    return _only_shapes(parameters, 1.0, 1.0)
+
+
+@compiled
+def _only_shapes(parameters: FloatArray, one: float, other: float) -> bool:
     others = 0
     for mode in range(SLIP_MODES):
-        if parameters[mode, SHAPE2] != 1.0 or parameters[mode, SHAPEV] != 1.0:
-            others += 1
+        for column in (SHAPE2, SHAPEV):
+            if parameters[mode, column] not in (one, other):
+                others += 1
     return others == 0
 
 

@@ -99,7 +99,7 @@ def series(
         e, w = rate2 * step * fade, ratev * step * slide
         place_pack(work, faded + 4 * i + 4, packed(e, w, shared * e, 0.0))
     if max(fall2, fallv) > order:
-        return reach_of(coefficients, order, rate2, ratev)
+        return reach_of(work, order, rate2, ratev, fall2, fallv)
     return inf
 
 
@@ -110,17 +110,16 @@ def fadings(order: int) -> int:
 
 
 @compiled
-def reach_of(coefficients: FloatArray, order: int, rate2: float, ratev: float) -> float:
-    """Time within which neither exponent falls by more than `order`, nor from above to below UNSEEN."""
+def reach_of(work: FloatArray, order: int, rate2: float, ratev: float, fall2: float, fallv: float) -> float:
+    """Time within which neither exponent falls by more than `order`, nor from above to below UNSEEN.
+
+    The exponents `fall2` and `fallv` change with the rates in `work`, two of every 4 numbers.
+    """
     reach = inf
     for k in range(1, order + 1):
-        two = coefficients[1, k]
-        for rate, start, term in (
-            (rate2, coefficients[1, 0], two),
-            (ratev, coefficients[1, 0] + coefficients[2, 0], two + coefficients[2, k]),
-        ):
-            exponent = -rate * start
-            if exponent > order and term != 0.0:
-                allowed = max(float(order), exponent - UNSEEN)
-                reach = min(reach, 0.5 * (allowed / abs(rate * term)) ** (1.0 / k))
+        known = pack_at(4, work, 4 * k - 4)
+        for fall, change in ((fall2, rate2 * number_of(known, 0)), (fallv, ratev * number_of(known, 1))):
+            if fall > order and change != 0.0:
+                allowed = max(float(order), fall - UNSEEN)
+                reach = min(reach, 0.5 * (allowed * k / abs(change)) ** (1.0 / k))
     return reach

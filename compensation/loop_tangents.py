@@ -8,9 +8,10 @@ the deviation.
 from __future__ import annotations
 
 from math import exp, expm1
-from typing import Final
+from typing import Any, Final
 
-from compensation.loop_modes import field
+from compensation.bell_series import BELL, rate_of, rates_of
+from compensation.loop_modes import field, mode_series
 from compensation.loop_parameters import (
     A1,
     A2,
@@ -30,8 +31,8 @@ from compensation.loop_parameters import (
     WIDTH2,
     WIDTHV,
 )
-from compensation.loop_series import fadings, series
-from ident.simulation.compiled import compiled, passed
+from compensation.loop_series import fadings
+from ident.simulation.compiled import compiled, passed, specialised
 from ident.simulation.filippov_system import FilippovSystem, FloatArray, Signs, no_slide, no_slide_at
 from ident.simulation.packs import fused, number_of, pack_at, packed, place_pack, spread
 
@@ -80,41 +81,59 @@ def tangent_series(
     coefficients: FloatArray,
     work: FloatArray,
 ) -> float:
-    """Taylor coefficients of the state and of two deviations into rows 0..8, all shapes 1."""
-    reach = series(signs, state[:STATES], parameters, order, coefficients, work)
+    """Taylor coefficients of the state and of two deviations into rows 0..8, shapes 1 or 2."""
+    reach = mode_series(signs, state[:STATES], parameters, order, coefficients, work)
     mode = (2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)
     a1, a2, a3 = parameters[mode, A1], parameters[mode, A2], parameters[mode, A3]
     c1, c2, gain = parameters[mode, C1], parameters[mode, C2], parameters[mode, GAIN]
     k2, kv, shared = parameters[mode, K2], parameters[mode, KV], parameters[mode, ALIKE]
-    rate2 = -parameters[mode, SIGN2] / parameters[mode, WIDTH2]
-    ratev = -parameters[mode, SIGNV] / parameters[mode, WIDTHV]
+    bell2, bellv = parameters[mode, SHAPE2] == BELL, parameters[mode, SHAPEV] == BELL
+    rate2 = rate_of(parameters[mode, SIGN2], parameters[mode, WIDTH2], bell2)
+    ratev = rate_of(parameters[mode, SIGNV], parameters[mode, WIDTHV], bellv)
     faded = fadings(order)
+    factors, slopes = 2 * faded, 3 * faded
+    start = pack_at(4, work, faded)
+    here2, here3 = state[1], state[2]
     for d in range(1, 1 + DEVIATIONS):
         s = STATES * d
-        rates, fades = 2 * faded * d, 2 * faded * d + faded  # where those of the deviation begin in `work`
+        own = 4 * faded * d  # where the deviation's share of `work` begins, in the order of the state's
         x1, x2, x3 = state[s], state[s + 1], state[s + 2]
         coefficients[s, 0], coefficients[s + 1, 0], coefficients[s + 2, 0] = x1, x2, x3
-        start = pack_at(4, work, faded)
-        e = rate2 * number_of(start, 0) * x2
-        w = ratev * (number_of(start, 1) * (x2 + x3) + number_of(start, 2) * x3)
-        place_pack(work, fades, packed(e, w, shared * e, 0.0))
+        begun2, begunv, apart = x2, x2 + x3, x3
+        if bell2:
+            begun2 = here2 * x2
+        if bellv:
+            begunv, apart = (here2 + here3) * (x2 + x3), here3 * x2 + (here2 + here3) * x3
+        e = rate2 * number_of(start, 0) * begun2
+        w = ratev * (number_of(start, 1) * begunv + number_of(start, 2) * apart)
         for i in range(order):
-            step = 1.0 / (i + 1)
             two = c1 * x1 + c2 * x2 + gain * x3
             three = a1 * x1 + a2 * x2 + a3 * x3 + k2 * e + kv * w
-            place_pack(work, rates + 4 * i, packed(two, two + three, three, 0.0))
+            place_pack(work, own + faded + 4 * i, packed(e, w, shared * e, 0.0))
+            product = spread(4, 0.0)
+            if bell2 or bellv:
+                place_pack(work, own + factors + 4 * i, packed(x2, x2 + x3, x2 + x3, x3))
+                place_pack(work, own + slopes + 4 * i, packed(two, two + three, three, two))
+                product = _crossed(work, own, factors, slopes, i)
+            place_pack(work, own + 4 * i, rates_of(product, two, three, bell2, bellv))
+            total = _crossed(work, own, 0, faded, i)
+            step = 1.0 / (i + 1)
             x1, x2, x3 = (x2 + x3) * step, two * step, three * step
             coefficients[s, i + 1], coefficients[s + 1, i + 1], coefficients[s + 2, i + 1] = x1, x2, x3
-            own, base = spread(4, 0.0), spread(4, 0.0)
-            for ahead in range(i + 1):
-                at, back = 4 * ahead, 4 * (i - ahead)
-                own = fused(pack_at(4, work, rates + at), pack_at(4, work, faded + back), own)
-                base = fused(pack_at(4, work, at), pack_at(4, work, fades + back), base)
-            both = own + base
-            e = rate2 * step * number_of(both, 0)
-            w = ratev * step * (number_of(both, 1) + number_of(both, 2))
-            place_pack(work, fades + 4 * i + 4, packed(e, w, shared * e, 0.0))
+            e = rate2 * step * number_of(total, 0)
+            w = ratev * step * (number_of(total, 1) + number_of(total, 2))
     return reach
+
+
+@specialised
+def _crossed(work: FloatArray, own: int, first: int, second: int, i: int) -> Any:
+    """Coefficient i of the deviation of a product: each factor's deviation with the other factor."""
+    one, other = spread(4, 0.0), spread(4, 0.0)
+    for j in range(i + 1):
+        at, back = 4 * j, 4 * (i - j)
+        one = fused(pack_at(4, work, own + first + at), pack_at(4, work, second + back), one)
+        other = fused(pack_at(4, work, first + at), pack_at(4, work, own + second + back), other)
+    return one + other
 
 
 @compiled

@@ -1,6 +1,6 @@
 """Many trajectories of the closed loop at once: arrays of starts and gains, side by side and on all cores.
 
-Where the modes have Taylor series, eight trajectories go side by side in the lanes of packs
+Where all Stribeck shapes are 1, eight trajectories go side by side in the lanes of packs
 (`simulation.lanes`); others go one by one.
 
 Neighbouring trajectories cost alike, and their cost changes along a sorted gain: part p of P takes every P-th
@@ -21,7 +21,7 @@ from compensation.closed_loop import STEP_LIMIT, ClosedLoop, checked_times
 from compensation.loop_lanes import LOOP_LANES
 from compensation.loop_modes import surfaces
 from compensation.loop_parameters import COLUMNS
-from compensation.loop_runs import begin, is_analytic, run_at, run_for
+from compensation.loop_runs import begin, is_exponential, run_at, run_for
 from compensation.loop_tables import gain_row, tables_over_gains
 from ident.model.friction import ModelError
 from ident.simulation.compiled import compiled, owning, passed
@@ -94,7 +94,7 @@ def simulate_many(
     states = np.full((count, wanted.size, STATES), np.nan)
     end_times, reasons = np.empty(count), np.empty(count, np.int64)
 
-    follow = run_side_by_side if is_analytic(tables[0]) and count >= parts * LANES else run_every
+    follow = run_side_by_side if is_exponential(tables[0]) and count >= parts * LANES else run_every
 
     def run_part(part: int) -> None:
         follow(runs, tables, part, parts, tolerance, duration, first, wanted, states, end_times, reasons)
@@ -144,7 +144,7 @@ def run_side_by_side(
     end_times: FloatArray,
     reasons: Signs,
 ) -> None:
-    """As `run_every`, eight at a time, where the modes have Taylor series; `runs` (1,)."""
+    """As `run_every`, eight at a time, for Stribeck shapes of 1; `runs` (1,)."""
     count = starts.shape[0]
     signs, contacts = np.zeros((count, SURFACES), np.int64), np.zeros((count, SURFACES), np.int64)
     batch = Batch(tables, times, states, starts, signs, contacts, end_times, reasons)

@@ -28,7 +28,7 @@ from data.recording import FloatArray
 from ident.model.friction import ModelError
 from ident.model.robot import OneLinkRobot
 from ident.near_rest import slip_near_rest, speed_limit
-from ident.simulation.compiled import compiled
+from ident.simulation.compiled import compiled, owning
 from ident.slip_series import (
     distance_at,
     expand,
@@ -75,7 +75,7 @@ def plant_array(robot: OneLinkRobot, ripple: TorqueRipple = NO_RIPPLE) -> FloatA
     return np.array([*law_array(robot), ripple.amplitude, ripple.harmonic, ripple.phase])
 
 
-@compiled
+@owning
 def advance(
     position: float, velocity: float, torque: float, period: float, law: FloatArray
 ) -> tuple[float, float]:
@@ -127,7 +127,7 @@ def advance_with_ripple(
     return advance(position, velocity, torque + added, period, plant)
 
 
-@compiled
+@owning
 def _respond(
     position: float, velocity: float, torque: FloatArray, period: float, law: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
@@ -166,7 +166,7 @@ def respond(
     return positions, velocities
 
 
-@compiled
+@owning
 def _breakaway_delay(ramp: float, travel: float, inertia: float, curve: FloatArray) -> float:
     series = workspace()
     stribeck_torque = curve[0] - curve[1]

@@ -26,7 +26,7 @@ from typing import Final
 import numpy as np
 
 from data.recording import FloatArray
-from ident.simulation.compiled import compiled
+from ident.simulation.compiled import compiled, owning
 
 ORDER: Final = 24  # highest order; a step of 1 ms of Table 1's robot ends at 8 to 14
 TOLERANCE: Final = 2e-17  # last terms, relative to the speed (to s + v_s where beta = 1)
@@ -35,7 +35,7 @@ _CHANGE: Final = 1.5  # largest change of y in a step
 _EXACT_ROOT: Final = 4e-16
 
 
-@compiled
+@owning
 def workspace() -> FloatArray:
     """Room for the coefficients of s, E and y, (3, ORDER + 1)."""
     return np.empty((3, ORDER + 1))

@@ -146,7 +146,7 @@ def calls(signature: Signature) -> Callable[[int, tuple[Any, ...]], Any]:
 
 
 class _ReachingCache(FunctionCache):
-    """numba's file cache with the digest of all that the kernel reaches in its key."""
+    """numba's file cache with the digest of all that the kernel reaches in its key, and of how it is made."""
 
     def __init__(self, function: Callable[..., object]) -> None:
         super().__init__(function)  # type: ignore[no-untyped-call]  # numba leaves its cache untyped
@@ -154,7 +154,7 @@ class _ReachingCache(FunctionCache):
 
     def _index_key(self, sig: object, codegen: object) -> tuple[object, ...]:
         key = super()._index_key(sig, codegen)  # type: ignore[no-untyped-call]  # as above
-        return (*key, reach_digest(self._function))
+        return (*key, _contents(__file__), reach_digest(self._function))
 
 
 def reach_digest(function: Callable[..., object]) -> str:

@@ -50,7 +50,7 @@ END_REASONS: Final = (
     "not finite",
 )
 
-WORK_ROWS: Final = 24
+WORK_ROWS: Final = 48  # of memory for a method, and for the series of a system
 STALLED_EVENTS: Final = 200  # events at one instant, after which the step limit is declared reached
 HELD_EVENTS: Final = (
     50  # events at one instant, after which a slide is held on for a little: rounding drives them

@@ -130,11 +130,12 @@ def test_a_state_between_two_steps_is_as_true_as_the_steps(shape: float, r: floa
 
 
 @pytest.mark.parametrize("tolerance", [1e-8, 1e-9, 1e-10])
-def test_a_fast_halt_does_not_leap_across_narrow_friction_peaks(tolerance: float) -> None:
+@pytest.mark.parametrize("shape", [1.99, 2.0])  # by Dormand-Prince, and by series
+def test_a_fast_halt_does_not_leap_across_narrow_friction_peaks(shape: float, tolerance: float) -> None:
     """Each law peaks within v_s of v = 0 or x2 = 0, where this loop spends a millisecond."""
 
     def law(static: float, coulomb: float, width: float, damping: float) -> StribeckCurve:
-        return StribeckCurve(static, coulomb, width, damping, 2.0)
+        return StribeckCurve(static, coulomb, width, damping, shape)
 
     believed = law(0.652, 0.453, 0.0408, 0.0766)
     robot = OneLinkRobot(
@@ -149,7 +150,9 @@ def test_a_fast_halt_does_not_leap_across_narrow_friction_peaks(tolerance: float
     np.testing.assert_allclose(run.state[0], truth.state[0], rtol=0, atol=1e3 * tolerance)
 
 
-def random_loop(seed: int) -> tuple[ClosedLoop, tuple[float, float, float]]:
+def random_loop(
+    seed: int, shapes: tuple[float, ...] = (1.0, 1.0, 1.3, 2.0)
+) -> tuple[ClosedLoop, tuple[float, float, float]]:
     random = np.random.default_rng(seed)
 
     def robot() -> OneLinkRobot:
@@ -159,7 +162,7 @@ def random_loop(seed: int) -> tuple[ClosedLoop, tuple[float, float, float]]:
                 coulomb_torque=float(coulomb),
                 stribeck_velocity=float(random.uniform(0.03, 0.2)),
                 viscous_damping=float(random.uniform(0.0, 0.2)),
-                stribeck_shape=float(random.choice([1.0, 1.0, 1.3, 2.0])),
+                stribeck_shape=float(random.choice(shapes)),
             )
             for coulomb in random.uniform(0.2, 0.6, 2)
         ]
@@ -182,8 +185,15 @@ def test_agrees_with_scipy_from_event_to_event(seed: int) -> None:
     np.testing.assert_allclose(run.state[0], piecewise(case, start, 3.0), atol=1e-7)
 
 
+@pytest.mark.parametrize("seed", range(8, 20))
+def test_series_of_exponentials_and_bells_agree_with_scipy(seed: int) -> None:
+    case, start = random_loop(seed, shapes=(1.0, 2.0, 2.0))
+    run = simulate(case, start, duration=3.0, times=[3.0], tolerance=1e-12)
+    np.testing.assert_allclose(run.state[0], piecewise(case, start, 3.0), atol=1e-7)
+
+
 @pytest.mark.parametrize("seed", range(6))
-@pytest.mark.parametrize("shape", [1.0, 1.3])
+@pytest.mark.parametrize("shape", [1.0, 1.3, 2.0])
 def test_friction_that_returns_from_below_rounding_is_not_missed(seed: int, shape: float) -> None:
     case, start = random_loop(seed)
     law = StribeckCurve(

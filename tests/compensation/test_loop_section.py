@@ -82,6 +82,28 @@ def test_other_shapes_have_cycles_too(shape: float) -> None:
     np.testing.assert_allclose(run.state[0], state, atol=1e-6)
 
 
+@pytest.mark.parametrize("shapes", [(2.0, 2.0), (1.0, 2.0), (2.0, 1.0)])
+def test_derivative_of_bells_is_that_of_differences(shapes: tuple[float, float]) -> None:
+    """Robot and model of the same or of other shapes: series of products, and their deviations."""
+    robot, model = (
+        replace(
+            symmetric_robot(),
+            friction=StribeckFriction.symmetric(
+                replace(symmetric_robot().friction.positive, stribeck_shape=shape, stribeck_velocity=0.2)
+            ),
+        )
+        for shape in shapes
+    )
+    gains = Gains(proportional=0.4, derivative=0.02, observer=10.0, compensation=1.1)
+    where = LoopSection(ClosedLoop(robot, Controller(gains, model)))
+    assert where.by_series
+    point = np.array([0.8, 0.05])
+    slope = where.derivative(point)
+    assert slope is not None
+    assert np.max(np.abs(slope)) > 1e-3
+    np.testing.assert_allclose(slope, differences(where, point, 1e-6), rtol=1e-5, atol=1e-8)
+
+
 def test_published_asymmetric_cycles_and_bistability() -> None:
     robot = asymmetric_robot()
     assert cycle_of(section(1.0, robot=robot)).amplitude == pytest.approx(0.185, abs=1e-3)
