@@ -55,7 +55,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 # options that numba's documentation does not list, but for the first two
-_OWNING: dict[str, Any] = {"error_model": "numpy", "nogil": True}
+_OWNING: dict[str, Any] = {"error_model": "numpy", "nogil": True, "_nrt": True}  # unset, it is the caller's
 _BORROWING: dict[str, Any] = {**_OWNING, "_nrt": False}
 _UNWRAPPED: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
