@@ -33,7 +33,7 @@ from compensation.observer import euler_change, exact_change
 from ident.model.friction import ModelError
 from ident.model.robot import OneLinkRobot
 from ident.response import NO_RIPPLE, TorqueRipple, advance_with_ripple, law_array, plant_array
-from ident.simulation.compiled import compiled
+from ident.simulation.compiled import compiled, owning
 
 FloatArray = NDArray[np.float64]
 _Settings = tuple[float, float, bool, int, float, float]  # h, resolution, exact?, delay, limit, reference
@@ -99,7 +99,7 @@ def _compensation(estimate: float, model: FloatArray) -> float:
     return float(magnitude if estimate > 0.0 else -magnitude)
 
 
-@compiled
+@owning
 def _run(
     plant: FloatArray,
     controller: FloatArray,
