@@ -12,9 +12,9 @@ serve; each law its own for the others), r is 0 to 2. Every end reason is checke
 Some loops are too sensitive for a first-order method over the whole duration: with exact compensation (the
 model is the robot, r = 1) x3 falls below rounding and grows again wherever friction falls with speed. There
 the stepper is started from our state in each of `WINDOWS` windows (`PIECEWISE`). Where it disagrees even
-there, our own solutions from nudged states must disagree with ours by half as much at least, and rest or move
-as the stepper's does, unless they differ by more than the whole motion (`UNSTABLE`): neither proves the other
-wrong. Both are counted; anything else is `CONTRADICTED`.
+there, our own solutions from nudged states under nudged gains must disagree with ours by half as much at
+least, and rest or move as the stepper's does, unless they differ by more than the whole motion (`UNSTABLE`):
+neither proves the other wrong. Both are counted; anything else is `CONTRADICTED`.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ FINER: Final = (0.01, 0.0025, 0.000625)  # of the windows
 WINDOWS: Final = 100
 CLOSE: Final = 1e-3  # of the state: so close, the order of convergence no longer matters
 NEAR: Final = 2e-2  # of the state: farther, it does not help
-STEPPER_NUDGE: Final = 1e-4  # of the state, about the stepper's error within a window
-NUDGES: Final = 8
+STEPPER_NUDGE: Final = 1e-4  # of the state, and of the gains: about the stepper's error in a window
+NUDGES: Final = 24
 WHOLE, PIECEWISE, UNSTABLE, CONTRADICTED = range(4)
 
 FloatArray = NDArray[np.float64]
@@ -175,7 +175,7 @@ def continues(loops: Loops, runs: Runs) -> tuple[Flags, Flags]:
     half, apart = half[doubtful], apart[doubtful]
     honest = solve(some, given.start, duration)
     spread, error = np.zeros(doubtful.size), np.zeros(doubtful.size)
-    for nudged in _nudges(half, NUDGE * size):
+    for nudged in _nudges(half, NUDGE * size[:, np.newaxis]):
         spread = np.maximum(spread, _apart(solve(some, nudged, 0.5 * duration), honest, size))
     for tolerance in TIGHTER:
         whole = solve(some, given.start, duration, tolerance=tolerance)
@@ -208,8 +208,11 @@ def _by_windows(loops: Loops, runs: Runs, size: FloatArray) -> NDArray[np.int64]
     found = _compare(pieces, start, end, moving, np.full(sizes.size, duration), sizes, FINER)
     open_ = np.flatnonzero(~found.agrees)
     spread, alike = np.zeros(open_.size), found.moving[open_] == moving[open_]
-    for nudge in _nudges(start[open_], STEPPER_NUDGE * sizes[open_]):
-        other = solve(pieces[open_], nudge, duration)
+    nudged_gains = _nudges(pieces.gains[open_], STEPPER_NUDGE * pieces.gains[open_])
+    for nudge, gains in zip(
+        _nudges(start[open_], STEPPER_NUDGE * sizes[open_, np.newaxis]), nudged_gains, strict=True
+    ):
+        other = solve(_loops(pieces.laws[open_], pieces.inertia[open_], np.abs(gains)), nudge, duration)
         spread = np.maximum(spread, np.max(np.abs(other.states[:, -1] - end[open_]), axis=1) / sizes[open_])
         alike |= other.moving[:, -1] == found.moving[open_]
     alike |= np.max(np.abs(end[open_]), axis=1) / sizes[open_] <= spread
@@ -269,8 +272,12 @@ def random_loops(count: int, generator: np.random.Generator) -> Loops:
             np.where(generator.random(count) < 0.1, 1.0, generator.uniform(0.0, 2.0, count)),
         ]
     )
-    tables = np.zeros((count, ROWS, COLUMNS))
-    for i in range(count):
+    return _loops(laws, inertia, gains)
+
+
+def _loops(laws: FloatArray, inertia: FloatArray, gains: FloatArray) -> Loops:
+    tables = np.zeros((gains.shape[0], ROWS, COLUMNS))
+    for i in range(gains.shape[0]):
         mode_table(laws[i], inertia[i], gains[i], tables[i])
     return Loops(laws, inertia, gains, tables)
 
@@ -347,11 +354,11 @@ def _edges(runs: Runs) -> FloatArray:
     return np.linspace(0.0, runs.times[-1], WINDOWS + 1)
 
 
-def _nudges(states: FloatArray, by: FloatArray) -> Iterator[FloatArray]:
-    """States (n, 3) beside given ones, `by` (n,) away."""
-    generator = np.random.default_rng(states.shape[0])
+def _nudges(values: FloatArray, by: FloatArray) -> Iterator[FloatArray]:
+    """Values (n, k) beside given ones, `by` (n, k) or (n, 1) away or up to a hundred times less."""
+    generator = np.random.default_rng(values.shape)
     for _ in range(NUDGES):
-        yield states + by[:, np.newaxis] * generator.normal(size=states.shape)
+        yield values + by * 10.0 ** generator.uniform(-2.0, 0.0) * generator.normal(size=values.shape)
 
 
 def _size(runs: Runs) -> FloatArray:

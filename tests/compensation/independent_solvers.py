@@ -1,7 +1,7 @@
 """Two other ways to solve inclusion (8), from its equations in (x1, x2, v), sharing no code with ours.
 
 `piecewise`: scipy's DOP853 with events between hand-made modes. `time_stepping`: Moreau's implicit scheme,
-which knows no events at all and is first order.
+which knows no events at all and is first order; the random campaign of the benchmarks uses it too.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from benchmarks.time_stepping import march
 from compensation.closed_loop import ClosedLoop
 from ident.model.friction import StribeckCurve
 
@@ -107,26 +108,29 @@ def piecewise(loop: ClosedLoop, start: tuple[float, float, float], duration: flo
 
 
 def time_stepping(
-    loop: ClosedLoop, start: tuple[float, float, float], duration: float, steps: int
+    loop: ClosedLoop, start: tuple[float, float, float], duration: float, fineness: float
 ) -> FloatArray:
-    """(x1, x2, x3) at the end, by implicit time stepping: v is where force balance meets the friction law."""
-    e = Equations(loop)
-    high, low = e.robot.friction.positive, e.robot.friction.negative
-    h = duration / steps
-    x1, x2, v = start[0], start[1], start[1] + start[2]
-    for _ in range(steps):
-        s2 = 1.0 if x2 > 0 or (x2 == 0 and x1 < 0) else -1.0
-        x2 = x2 + h * e.estimate_rate(x1, x2, v, s2)
-        torque = e.torque(x1 + h * v, x2, 1.0 if x2 >= 0 else -1.0)
-        push = v + h / e.robot.inertia * torque
-        v_next = 0.0
-        for sign, curve in ((1.0, high), (-1.0, low)):
-            if sign * push > h / e.robot.inertia * curve.static_torque:
-                damping = 1.0 + h / e.robot.inertia * curve.viscous_damping
-                v_next = sign * abs(v) if sign * v > 0 else 0.0
-                for _ in range(60):
-                    friction = sign * dry(curve, sign * v_next)
-                    v_next = (push - h / e.robot.inertia * friction) / damping
-        v = v_next
-        x1 = x1 + h * v
-    return np.array([x1, x2, v - x2])
+    """(x1, x2, x3) at the end, by implicit steps of `fineness`, in shortest time constants of the loop."""
+    robot, model, gains = loop.robot, loop.controller.model, loop.controller.gains
+    sides = (robot.friction, model.friction)
+    laws = np.array([_row(curve) for side in sides for curve in (side.positive, side.negative)])
+    state = np.array([start[0], start[1], start[1] + start[2]])
+    march(
+        laws,
+        np.array([robot.inertia, model.inertia]),
+        np.array([gains.proportional, gains.derivative, gains.observer, gains.compensation]),
+        fineness,
+        duration,
+        state,
+    )
+    return np.array([state[0], state[1], state[2] - state[1]])
+
+
+def _row(curve: StribeckCurve) -> tuple[float, ...]:
+    return (
+        curve.static_torque,
+        curve.coulomb_torque,
+        curve.stribeck_velocity,
+        curve.viscous_damping,
+        curve.stribeck_shape,
+    )
