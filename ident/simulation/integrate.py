@@ -139,7 +139,8 @@ def integrate(
                 duration = max(duration, crawl)
                 crawl = min(2.0 * crawl, LONGEST_CRAWL)
             span = min(duration, left)
-            while output < wanted and record.times[output] <= time + span:
+            until = settings.end if span == left else time + span  # their sum may round below the end
+            while output < wanted and record.times[output] <= until:
                 system.slide_at(signs, state, parameters, record.times[output] - time, record.states[output])
                 output += 1
             if duration == np.inf:

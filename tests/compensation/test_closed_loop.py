@@ -150,6 +150,16 @@ def test_a_fast_halt_does_not_leap_across_narrow_friction_peaks(shape: float, to
     np.testing.assert_allclose(run.state[0], truth.state[0], rtol=0, atol=1e3 * tolerance)
 
 
+def test_the_last_output_of_a_run_that_rests_is_given() -> None:
+    """0.9649 s + (7.45 s - 0.9649 s) rounds below 7.45 s."""
+    gains = Gains(proportional=0.4, derivative=0.02, observer=73.5, compensation=0.95)
+    case = ClosedLoop(symmetric_robot(), Controller(gains, symmetric_robot()))
+    for duration in (7.45, *np.random.default_rng(1).uniform(2.0, 9.0, 200).tolist()):
+        run = simulate(case, (1.156, 0.0, 0.0), duration=duration, times=[duration])
+        assert run.end_reason == "equilibrium"
+        assert np.all(np.isfinite(run.state))
+
+
 def random_loop(
     seed: int, shapes: tuple[float, ...] = (1.0, 1.0, 1.3, 2.0)
 ) -> tuple[ClosedLoop, tuple[float, float, float]]:

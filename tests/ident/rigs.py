@@ -18,7 +18,7 @@ from data.protocols import ProtocolName
 from data.recording import FloatArray, Recording
 from ident.model.published import asymmetric_robot
 from ident.model.robot import OneLinkRobot
-from ident.simulation.compiled import compiled
+from ident.simulation.compiled import owning
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ def multisine(
     return np.asarray(amplitude * wave / np.sqrt(np.mean(wave**2)), dtype=np.float64)
 
 
-@compiled
+@owning
 def _friction(law: FloatArray, v: float) -> float:
     k = 1 if v > 0 else 6
     s = abs(v)
@@ -183,7 +183,7 @@ def _friction(law: FloatArray, v: float) -> float:
     return float(total) if v > 0 else -float(total)
 
 
-@compiled
+@owning
 def _step(
     law: FloatArray, q: float, v: float, u: float, h: float, ripple: float, cycles: float
 ) -> tuple[float, float]:
@@ -205,7 +205,7 @@ def _step(
     return q + h * 0.5 * (v + after), after
 
 
-@compiled
+@owning
 def _sample(
     law: FloatArray, q: float, v: float, u: float, period: float, steps: int, ripple: float, cycles: float
 ) -> tuple[float, float]:
@@ -214,7 +214,7 @@ def _sample(
     return q, v
 
 
-@compiled
+@owning
 def _driven(
     law: FloatArray, torque: FloatArray, speed: float, period: float, steps: int, ripple: float, cycles: float
 ) -> FloatArray:
@@ -226,7 +226,7 @@ def _driven(
     return position
 
 
-@compiled
+@owning
 def _ramps(
     law: FloatArray,
     rates: FloatArray,
