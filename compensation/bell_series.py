@@ -29,6 +29,7 @@ from compensation.loop_parameters import (
     WIDTH2,
     WIDTHV,
     fading_difference,
+    slip_row,
 )
 from compensation.loop_series import fadings, reach_of
 from ident.simulation.compiled import compiled, specialised
@@ -68,7 +69,7 @@ def bell_series(
 
     Behind the fadings `work` keeps the factors of the rates, (x2, v, v, x3) and (x2', v', x3', x2').
     """
-    mode = (2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)
+    mode = slip_row(signs)
     a1, a2, a3 = parameters[mode, A1], parameters[mode, A2], parameters[mode, A3]
     c1, c2, gain = parameters[mode, C1], parameters[mode, C2], parameters[mode, GAIN]
     k2, kv, shared = parameters[mode, K2], parameters[mode, KV], parameters[mode, ALIKE]

@@ -25,6 +25,7 @@ from compensation.loop_parameters import (
     SIGNV,
     WIDTH2,
     WIDTHV,
+    slip_row,
 )
 from compensation.loop_series import reach_of
 from ident.simulation.compiled import compiled, passed, specialised
@@ -43,7 +44,7 @@ D3, DV, E, W = ROW, 2 * ROW, 3 * ROW, 4 * ROW  # in `work`, where those of x2' c
 @compiled
 def enter(signs: Signs, parameters: FloatArray, lane: int, modes: FloatArray) -> None:
     """The coefficients of a slip mode into a column of `modes` (16, LANES)."""
-    row = (2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)
+    row = slip_row(signs)
     for i in range(COLUMNS):
         modes[i, lane] = parameters[row, i]
 
@@ -65,10 +66,9 @@ def lane_series(
         none - _of(modes, SIGN2) / _of(modes, WIDTH2),
         none - _of(modes, SIGNV) / _of(modes, WIDTHV),
     )
-    fall2, fallv = rate2 * x2, ratev * (x2 + x3)
-    e = exponential(fall2)
+    e = exponential(rate2 * x2)
     apart = ratev * x3
-    alone = exponential(fallv)
+    alone = exponential(ratev * (x2 + x3))
     difference = chosen(apart, e, none - alone) * exponential_less_one(none - magnitude(apart))
     w = chosen(shared, alone, difference)
     place_pack(work, E, e)

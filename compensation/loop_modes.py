@@ -59,6 +59,7 @@ from compensation.loop_parameters import (
     WIDTHV,
     fading,
     fading_difference,
+    slip_row,
 )
 from compensation.loop_series import series
 from ident.simulation.compiled import compiled, passed
@@ -74,7 +75,7 @@ NEWTON_LIMIT: Final = 100
 @compiled
 def field(signs: Signs, state: FloatArray, parameters: FloatArray, out: FloatArray) -> None:
     """dx/dt (3,) in a slip mode."""
-    k = parameters[(2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)]
+    k = parameters[slip_row(signs)]
     x1, x2, x3 = state[0], state[1], state[2]
     by_estimate = fading(k[SIGN2] * x2, k[WIDTH2], k[SHAPE2])
     by_velocity = fading(k[SIGNV] * (x2 + x3), k[WIDTHV], k[SHAPEV])
@@ -179,7 +180,7 @@ def mode_series(
     work: FloatArray,
 ) -> float:
     """Taylor coefficients in a slip mode whose shapes are 1 or 2: `FilippovSystem.series`."""
-    mode = (2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)
+    mode = slip_row(signs)
     if parameters[mode, SHAPE2] == 1.0 and parameters[mode, SHAPEV] == 1.0:
         return series(signs, state, parameters, order, coefficients, work)
     return bell_series(signs, state, parameters, order, coefficients, work)

@@ -9,7 +9,7 @@ from math import exp, expm1
 from typing import Final
 
 from ident.simulation.compiled import compiled
-from ident.simulation.filippov_system import FloatArray
+from ident.simulation.filippov_system import FloatArray, Signs
 
 # Rows 0..3 of the parameters: slip, by 2 (x2 > 0) + (v > 0). Rows 4, 5: stick, by (x2 > 0).
 A1, A2, A3, K0, K2, KV, C1, C2, GAIN, SIGN2, SIGNV, WIDTH2, WIDTHV, SHAPE2, SHAPEV, ALIKE = range(16)
@@ -17,6 +17,12 @@ RATE, GOAL, STIFF, DAMP, COULOMB, FADING, WIDTH, SHAPE, HIGH, LOW = range(10)
 ROWS: Final = 6
 COLUMNS: Final = 16
 SLOWEST: Final = 1e-12  # [1/s] stands for an observer without gain or damping, whose estimate never settles
+
+
+@compiled
+def slip_row(signs: Signs) -> int:
+    """The row of a slip mode, by the signs of x2 and of v."""
+    return (2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)
 
 
 @compiled

@@ -32,6 +32,7 @@ from compensation.loop_parameters import (
     WIDTH2,
     WIDTHV,
     fading_difference,
+    slip_row,
 )
 from ident.simulation.compiled import compiled
 from ident.simulation.filippov_system import FloatArray, Signs
@@ -55,7 +56,7 @@ def series(
     Returns for how long the series hold: at many times v_s, E is lost in rounding, yet is back before v is
     small.
     """
-    mode = (2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)
+    mode = slip_row(signs)
     a1, a2, a3 = parameters[mode, A1], parameters[mode, A2], parameters[mode, A3]
     c1, c2, gain = parameters[mode, C1], parameters[mode, C2], parameters[mode, GAIN]
     k2, kv, shared = parameters[mode, K2], parameters[mode, KV], parameters[mode, ALIKE]

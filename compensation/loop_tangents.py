@@ -30,6 +30,7 @@ from compensation.loop_parameters import (
     SIGNV,
     WIDTH2,
     WIDTHV,
+    slip_row,
 )
 from compensation.loop_series import fadings
 from ident.simulation.compiled import compiled, passed, specialised
@@ -57,7 +58,7 @@ def _faded(signed: float, width: float, shape: float) -> tuple[float, float]:
 def tangent_field(signs: Signs, state: FloatArray, parameters: FloatArray, out: FloatArray) -> None:
     """Time derivatives (9,) of the state and of two deviations."""
     field(signs, state[:STATES], parameters, out[:STATES])
-    k = parameters[(2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)]
+    k = parameters[slip_row(signs)]
     _, slope2 = _faded(k[SIGN2] * state[1], k[WIDTH2], k[SHAPE2])
     _, slopev = _faded(k[SIGNV] * (state[1] + state[2]), k[WIDTHV], k[SHAPEV])
     by_estimate, by_velocity = k[SIGN2] * slope2, k[SIGNV] * slopev
@@ -83,7 +84,7 @@ def tangent_series(
 ) -> float:
     """Taylor coefficients of the state and of two deviations into rows 0..8, shapes 1 or 2."""
     reach = mode_series(signs, state[:STATES], parameters, order, coefficients, work)
-    mode = (2 if signs[0] > 0 else 0) + (1 if signs[1] > 0 else 0)
+    mode = slip_row(signs)
     a1, a2, a3 = parameters[mode, A1], parameters[mode, A2], parameters[mode, A3]
     c1, c2, gain = parameters[mode, C1], parameters[mode, C2], parameters[mode, GAIN]
     k2, kv, shared = parameters[mode, K2], parameters[mode, KV], parameters[mode, ALIKE]
