@@ -7,6 +7,11 @@ with hats for what the controller believes. Where the model is the robot, subtra
 paper's x3' = -(b/J + L) x3 + (r F(x2) - F(v))/J. The solution is exact but for the tolerance of its
 smooth pieces: friction is set-valued, a stick is a stick, and its end is found to rounding
 (`loop_modes`).
+
+Laws with beta < 1 fall infinitely steeply from rest. Near x2 = 0 an error e of the estimate is then one of
+e^beta in the compensation, and that is how accurate a solution is; and the estimate is drawn onto a path on
+which it comes to zero without crossing it (x2 = -(c/k)^(1/beta) for a torque c that passes zero), so close
+that rounding would decide. It is taken to touch zero there and to keep its sign, an event of its own.
 """
 
 from __future__ import annotations
@@ -19,7 +24,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.controller import Controller
-from compensation.loop_modes import MOTION
 from compensation.loop_runs import (
     EVENT_NAMES,
     begin,
@@ -120,7 +124,7 @@ def _run(
     parts: list[Marks] = []
     time, steps = 0.0, STEP_LIMIT
     while True:
-        moving = signs[MOTION]
+        first = signs.copy()
         at, which = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64)
         modes, where = np.empty((EVENT_STORE, 2), np.int64), np.empty((EVENT_STORE, 3))
         end: Progress = run(
@@ -142,7 +146,7 @@ def _run(
             modes,
             where,
         )
-        name_events(which[: end.events], modes, moving)
+        name_events(which[: end.events], modes, first)
         parts.append(Marks(at[: end.events], which[: end.events], where[: end.events], EVENT_NAMES))
         time, steps = end.time, steps - end.steps
         if end.reason != EVENTS_FULL:

@@ -13,6 +13,7 @@ from itertools import zip_longest
 from typing import Final
 
 from compensation.closed_loop import ClosedLoop, simulate
+from compensation.loop_runs import TOUCH
 from ident.simulation.filippov_system import FloatArray
 from ident.simulation.trajectory import Event
 
@@ -36,10 +37,10 @@ class Stick:
 
 
 def events_of(loop: ClosedLoop, point: FloatArray, duration: float) -> tuple[Event, ...]:
-    """Events within `duration` [s] after a halt at `point` = (x1 [rad], x2 [rad/s])."""
+    """Events within `duration` [s] after a halt at `point` = (x1 [rad], x2 [rad/s]), but for mere touches."""
     start = (float(point[0]), float(point[1]), -float(point[1]))
     run = simulate(loop, start, duration=duration * (1.0 + SLACK), times=(), tolerance=TOLERANCE)
-    return run.events
+    return tuple(event for event in run.events if event.kind != TOUCH)
 
 
 def mode_sequence(events: tuple[Event, ...]) -> tuple[str, ...]:

@@ -22,7 +22,8 @@ from compensation.orbits.periodic_orbits import Cycle, NoCycle, find_cycle
 from ident.simulation.filippov_system import FloatArray
 
 STARTS: Final = (0.6, -0.6, 0.1, -0.1)  # x1(0) [rad] from which cycles are looked for
-SAME_CYCLE: Final = 1e-6  # relative difference of extremes and period
+SAME_CYCLE: Final = 1e-6  # relative difference of extremes and period, at least
+SAME_POINTS: Final = 30.0  # times the accuracy of the map, in which cycles are one
 
 
 def stable_cycles(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> list[list[Cycle]]:
@@ -36,7 +37,7 @@ def stable_cycles(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> l
     for index in range(grid.size - 2, -1, -1):
         for cycle in found[index + 1]:
             if len(found[index]) < len(found[index + 1]):
-                _add(found[index], cycle_near(loop, parameter, float(grid[index]), cycle))
+                _add(found[index], cycle_near(loop, parameter, float(grid[index]), cycle), first)
     return found
 
 
@@ -78,7 +79,7 @@ def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, cold: Float
             known: list[Cycle] = []
             point = found[-1][0].point if found and found[-1] else cold
             section = LoopSection(with_gain(loop, parameter, float(grid[len(found)])))
-            _add(known, find_cycle(section, point))
+            _add(known, find_cycle(section, point), section)
             found.append(known)
     return found
 
@@ -114,16 +115,17 @@ def _searched(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> list[
         warm = [cycle.point for cycle in found[-1]] if found else []
         cold = STARTS[:1] if section.symmetric else STARTS
         for point in warm:
-            _add(known, find_cycle(section, point))
+            _add(known, find_cycle(section, point), section)
         if not (section.symmetric and warm):
             for x1 in cold:
-                _add(known, find_cycle(section, np.array([x1, 0.0])))
+                _add(known, find_cycle(section, np.array([x1, 0.0])), section)
         found.append(known)
     return found
 
 
-def _add(known: list[Cycle], candidate: Cycle | NoCycle) -> None:
+def _add(known: list[Cycle], candidate: Cycle | NoCycle, section: LoopSection) -> None:
     if not isinstance(candidate, Cycle) or not candidate.stable or not math.isfinite(candidate.period):
         return
-    if all(distance(candidate, cycle) > SAME_CYCLE for cycle in known):
+    same = max(SAME_CYCLE, SAME_POINTS * section.accuracy)
+    if all(distance(candidate, cycle) > same for cycle in known):
         known.append(candidate)

@@ -14,7 +14,7 @@ import numpy as np
 from numba import float64, int64, types
 
 from compensation.bell_series import BELL
-from compensation.loop_modes import MOTION, SYSTEM, surfaces
+from compensation.loop_modes import MOTION, REVERSAL, SYSTEM, surfaces
 from compensation.loop_parameters import SHAPE2, SHAPEV
 from ident.simulation.compiled import address_of, calls, compiled, owning
 from ident.simulation.dormand_prince import DORMAND_PRINCE
@@ -23,13 +23,14 @@ from ident.simulation.integrate import Progress, Record, Settings, integrate, me
 from ident.simulation.taylor import TAYLOR
 
 SLIP_MODES: Final = 4
+TOUCH: Final = "estimate touch"  # x2 comes to zero but for the tolerance, and keeps its sign
 PROGRESS: Final = types.NamedTuple((float64, *4 * (int64,)), Progress)  # type: ignore[no-untyped-call]  # numba
 RUN: Final = PROGRESS(
     float64[:, ::1], float64, float64, int64, int64, int64, int64, float64, float64[::1], int64[::1],
     int64[::1], float64[::1], float64[:, ::1], float64[::1], int64[::1], int64[:, ::1], float64[:, ::1],
 )  # fmt: skip
 run_at: Final = calls(RUN)  # run_at(address, arguments of `run_series`)
-EVENT_NAMES: Final = ("stick", "slip", "velocity reversal", "estimate reversal")
+EVENT_NAMES: Final = ("stick", "slip", "velocity reversal", "estimate reversal", TOUCH)
 
 
 @compiled
@@ -42,6 +43,11 @@ def is_analytic(parameters: FloatArray) -> bool:
 def is_exponential(parameters: FloatArray) -> bool:
     """Whether all Stribeck shapes are 1."""
     return _only_shapes(parameters, 1.0, 1.0)
+
+
+def smallest_shape(parameters: FloatArray) -> float:
+    """The smallest Stribeck shape of all slip modes: below 1, friction falls infinitely steeply from rest."""
+    return float(np.min(parameters[:SLIP_MODES, (SHAPE2, SHAPEV)]))
 
 
 @compiled
@@ -88,18 +94,19 @@ def begin(parameters: FloatArray, state: FloatArray, signs: Signs, contact: Sign
 
 
 @compiled
-def name_events(surfaces_met: Signs, modes: Signs, moving: int) -> None:
+def name_events(surfaces_met: Signs, modes: Signs, first: Signs) -> None:
     """Turn the surfaces (e,) that were met into indices of EVENT_NAMES, in place.
 
-    `modes` (e or more, 2) are those after the events, `moving` is the sign of v before the first.
+    `modes` (e or more, 2) are those after the events, `first` (2,) that before the first.
     """
+    moving, estimate = first[MOTION], first[REVERSAL]
     for i in range(surfaces_met.size):
         after = modes[i, MOTION]
         if surfaces_met[i] == MOTION or after != moving:
             surfaces_met[i] = 0 if after == 0 else 1 if moving == 0 else 2
         else:
-            surfaces_met[i] = 3
-        moving = after
+            surfaces_met[i] = 4 if modes[i, REVERSAL] == estimate else 3
+        moving, estimate = after, modes[i, REVERSAL]
 
 
 @owning

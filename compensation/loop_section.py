@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final
@@ -10,7 +11,7 @@ import numpy as np
 
 from compensation.closed_loop import ClosedLoop
 from compensation.loop_returns import MOST_HALTS, carry_for, derivative, returns
-from compensation.loop_runs import is_analytic, run_for
+from compensation.loop_runs import is_analytic, run_for, smallest_shape
 from compensation.loop_tables import mode_parameters
 from compensation.orbits.periodic_orbits import Returns
 from ident.model.friction import StribeckFriction
@@ -20,6 +21,7 @@ from ident.simulation.integrate import END_REASONS, SECTION
 
 TOLERANCE: Final = 1e-13  # of a step; series lose nothing by it
 TOLERANCE_ELSE: Final = 1e-11  # of a Dormand-Prince step
+REPEATS: Final = 1e-11  # relative distance of points that are the same
 GAIN_NAMES: Final = {"r": "compensation", "L": "observer", "n1": "proportional", "n2": "derivative"}
 PATIENCE: Final = 200.0  # [s] for one half turn
 
@@ -48,6 +50,16 @@ class LoopSection:
     def _tolerance(self) -> float:
         return TOLERANCE if self.by_series else TOLERANCE_ELSE
 
+    @property
+    def accuracy(self) -> float:
+        """Relative distance of points that are the same.
+
+        Where a law falls as the power beta < 1 of the speed, an error e of x2 near zero is one of e^beta
+        in the friction.
+        """
+        beta = smallest_shape(self._parameters)
+        return REPEATS if beta >= 1.0 else TOLERANCE_ELSE**beta
+
     def follow(self, point: FloatArray, returns: int) -> Returns:
         """The next returns after a point (2,) of the section."""
         return self.follow_state(_state(point), returns)
@@ -63,7 +75,23 @@ class LoopSection:
         return Returns(rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], END_REASONS[reason])
 
     def derivative(self, point: FloatArray) -> FloatArray | None:
-        """Derivative (2, 2) of one return from a point (2,)."""
+        """Derivative (2, 2) of one return from a point (2,).
+
+        By deviations carried along, or by differences where a law is not Lipschitz (beta < 1): there the
+        coefficients of the deviations' equation are unbounded near x2 = 0.
+        """
+        return (
+            self._carried(point) if smallest_shape(self._parameters) >= 1.0 else self._by_differences(point)
+        )
+
+    def _by_differences(self, point: FloatArray) -> FloatArray | None:
+        by = math.sqrt(self.accuracy) * float(np.max(np.abs(point)))
+        ends = [self.follow(point + step, 1).points for step in by * np.vstack([np.eye(2), -np.eye(2)])]
+        if any(end.size == 0 for end in ends):
+            return None
+        return np.column_stack([ends[0][0] - ends[2][0], ends[1][0] - ends[3][0]]) / (2.0 * by)
+
+    def _carried(self, point: FloatArray) -> FloatArray | None:
         state = _state(point)
         slope = np.eye(2)
         run, carried = run_for(self._parameters), carry_for(self._parameters)

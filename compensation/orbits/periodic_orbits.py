@@ -26,7 +26,6 @@ MOST_TURNS: Final = 6  # returns a cycle may take
 PATIENCE: Final = 240  # returns to follow before giving up
 FIRST_LOOK: Final = 3
 LATER_LOOKS: Final = 24
-SAME: Final = 1e-11  # relative distance of points that are the same
 NEWTON_STEPS: Final = 12
 SAME_POINT: Final = 1e-7  # relative distance of points of a converged cycle that are one
 VANISHED: Final = 1e-9  # of the start: what has become as small decays
@@ -50,6 +49,10 @@ class ReturnMap(Protocol):
     @property
     def symmetric(self) -> bool:
         """Whether a return is a half turn followed by a change of sign."""
+
+    @property
+    def accuracy(self) -> float:
+        """Relative distance within which the map tells points apart no more: they are the same."""
 
     def follow(self, point: FloatArray, returns: int) -> Returns:
         """The next `returns` returns after a point (d,) of the section."""
@@ -90,7 +93,7 @@ def find_cycle(section: ReturnMap, start: FloatArray) -> Cycle | NoCycle:
     while True:
         if done.end_reason != "section reached":
             return NoCycle(done.end_reason)
-        returns = _repeats(points, SAME)
+        returns = _repeats(points, section.accuracy)
         if returns:
             return cycle_at(section, points[-1], returns)
         if float(np.max(np.abs(points[-1]))) <= VANISHED * float(np.max(np.abs(start))):
@@ -116,7 +119,7 @@ def shoot(section: ReturnMap, guess: FloatArray, returns: int) -> Cycle | NoCycl
             return NoCycle(done.end_reason)
         change = np.linalg.solve(np.eye(point.size) - slope, done.points[-1] - point)
         point = point + change
-        if float(np.max(np.abs(change))) <= SAME * float(np.max(np.abs(point))):
+        if float(np.max(np.abs(change))) <= section.accuracy * float(np.max(np.abs(point))):
             return cycle_at(section, point, returns)
     return NoCycle(f"shooting did not converge in {NEWTON_STEPS} steps")
 
@@ -124,7 +127,8 @@ def shoot(section: ReturnMap, guess: FloatArray, returns: int) -> Cycle | NoCycl
 def cycle_at(section: ReturnMap, point: FloatArray, returns: int) -> Cycle | NoCycle:
     """The cycle through a fixed point (d,) of the map's iterate, the point corrected by one Newton step."""
     done = section.follow(point, returns)
-    fewer = _repeats(np.concatenate([done.points[-1:], done.points]), SAME_POINT)
+    same = max(SAME_POINT, section.accuracy)
+    fewer = _repeats(np.concatenate([done.points[-1:], done.points]), same)
     if done.end_reason == "section reached" and 0 < fewer < returns:
         return cycle_at(section, point, fewer)
     slope = slope_of(section, point, returns)

@@ -18,10 +18,15 @@ from ident.simulation.filippov_system import FilippovSystem, FloatArray, OneStep
 
 @compiled
 def saltate(deviations: FloatArray, before: FloatArray, after: FloatArray, normal: FloatArray) -> None:
-    """Carry deviations (k, n), in place, across the surface with `normal` (n,) between two fields (n,)."""
+    """Carry deviations (k, n), in place, across the surface with `normal` (n,) between two fields (n,).
+
+    A field along the surface, of a motion that only touches it, leaves them as they are.
+    """
     speed = 0.0
     for j in range(normal.size):
         speed += normal[j] * before[j]
+    if speed == 0.0:
+        return
     for i in range(deviations.shape[0]):
         ahead = 0.0
         for j in range(normal.size):

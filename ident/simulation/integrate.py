@@ -22,6 +22,7 @@ import numpy as np
 from ident.simulation.compiled import compiled, specialised
 from ident.simulation.crossing import evaluate, first_crossing
 from ident.simulation.filippov_system import (
+    TANGENT_STEP,
     FilippovSystem,
     FloatArray,
     OneStepMethod,
@@ -194,9 +195,14 @@ def integrate(
             if surface < 0:
                 continue
             arrived_from = signs[surface]
-            _meet(system, surfaces, parameters, surface, state, signs, contact, rate)
+            reached = _meet(system, surfaces, parameters, surface, state, signs, contact, rate)
             if signs[surface] == arrived_from:
                 _hold(system, surfaces, parameters, surface, state, signs, contact, rate)
+            elif reached == 1 and signs[surface] == -arrived_from:
+                time += _turn_back(
+                    system, surfaces, parameters, surface, arrived_from, settings, time, state, signs,
+                    contact, rate,
+                )  # fmt: skip
         if events < record.event_times.size:
             record.event_times[events] = time
             record.event_surfaces[events] = surface
@@ -305,8 +311,11 @@ def _meet(
     signs: Signs,
     contact: Signs,
     rate: FloatArray,
-) -> None:
-    """A surface was reached: put the state onto it, and onto all others reached with it, and resolve them."""
+) -> int:
+    """A surface was reached: put the state onto it, and onto all others reached with it, and resolve them.
+
+    Returns how many were reached.
+    """
     project(surfaces, surface, state)
     reached = 0
     for i in range(signs.size):
@@ -320,6 +329,46 @@ def _meet(
     for i in range(signs.size):
         if contact[i] == 1:
             signs[i] = resolve(system, surfaces, i, signs, state, parameters, rate)
+    return reached
+
+
+@specialised
+def _turn_back(
+    system: FilippovSystem,
+    surfaces: Surfaces,
+    parameters: FloatArray,
+    surface: int,
+    side: int,
+    settings: Settings,
+    time: float,
+    state: FloatArray,
+    signs: Signs,
+    contact: Signs,
+    rate: FloatArray,
+) -> float:
+    """Undo a crossing that is shallower than the error of a step, and go to where it turns back; how long.
+
+    Which side such a motion goes on to is beyond the tolerance, and it is kept on its own, whatever the
+    tolerance. That matters where the field is not Lipschitz: a term that grows as the root of the distance
+    draws the motion onto a path that touches the surface, which it passes at a distance far below rounding.
+    """
+    n, size = state.size, 0.0
+    for j in range(n):
+        size = max(size, abs(state[j]))
+    nearing = side * leaving_rate(system, surfaces, surface, side, signs, state, parameters, rate)
+    for j in range(n):
+        rate[n + j] = state[j] + TANGENT_STEP * rate[j]
+    ahead = rate[n : 2 * n]
+    later = side * leaving_rate(system, surfaces, surface, side, signs, ahead, parameters, rate)
+    turning = (later - nearing) / TANGENT_STEP
+    if nearing >= 0.0 or turning <= 0.0 or 0.5 * nearing * nearing > settings.tolerance * size * turning:
+        return 0.0
+    span = min(-nearing / turning, settings.end - time)
+    for j in range(n):
+        state[j] += span * (ahead[j] - state[j]) / TANGENT_STEP
+    project(surfaces, surface, state)
+    signs[surface], contact[surface] = side, 2
+    return span
 
 
 @specialised

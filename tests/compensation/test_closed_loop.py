@@ -253,6 +253,38 @@ def test_every_end_reason_is_true(
             np.testing.assert_allclose(rest.end_state, run.end_state, atol=1e-6 + 100 * spread)
 
 
+@pytest.mark.parametrize("tolerance", [1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13])
+def test_a_law_steep_at_rest_gives_one_answer_at_any_tolerance(tolerance: float) -> None:
+    """At t = 3.664 s the estimate passes zero at a distance of 6e-16: which side it goes on to is a rule."""
+    robot = OneLinkRobot(
+        0.125,
+        StribeckFriction(StribeckCurve(0.5, 0.5, 0.5, 0.125), StribeckCurve(0.3125, 0.3125, 0.5, 0.125)),
+    )
+    model = OneLinkRobot(
+        0.0625,
+        StribeckFriction(StribeckCurve(0.25, 0.25, 0.5, 0.0), StribeckCurve(0.625, 0.125, 0.5, 0.0, 0.5)),
+    )
+    case = ClosedLoop(robot, Controller(Gains(1.5, 0.0, 69.0, 1.375), model))
+    run = simulate(case, START, duration=5.0, tolerance=tolerance)
+    expected = [-0.08309438, -0.40701476, -0.02292276]  # 7e-4 from where the other side leads
+    np.testing.assert_allclose(run.end_state, expected, atol=1e-8 + tolerance**0.5, rtol=0)
+    touches = [event for event in run.events if event.kind == "estimate touch"]
+    assert all(event.state[1] == 0.0 and abs(event.time - 3.663975) < 1e-5 for event in touches)
+
+
+@pytest.mark.parametrize("shape", [0.5, 0.7, 0.9])
+def test_laws_steep_at_rest_converge_with_the_power_beta_of_the_tolerance(shape: float) -> None:
+    curve = replace(symmetric_robot().friction.positive, stribeck_shape=shape)
+    robot = OneLinkRobot(0.026, StribeckFriction.symmetric(curve))
+    case = ClosedLoop(robot, Controller(Gains(0.4, 0.02, 120.0, 1.05), robot))
+    ends = {
+        tolerance: simulate(case, START, duration=10.0, times=(), tolerance=tolerance).end_state
+        for tolerance in (1e-6, 1e-8, 1e-10, 1e-13)
+    }
+    for tolerance in (1e-6, 1e-8, 1e-10):
+        np.testing.assert_allclose(ends[tolerance], ends[1e-13], atol=3.0 * tolerance**shape, rtol=0)
+
+
 def test_torque_is_the_control_law() -> None:
     case = loop(1.1, robot=asymmetric_robot())
     law = symmetric_robot().friction.positive

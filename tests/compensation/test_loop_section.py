@@ -70,6 +70,19 @@ def test_derivative_of_a_turn_with_sticking_and_asymmetry() -> None:
     np.testing.assert_allclose(slope, differences(where, point, 1e-7), rtol=1e-3, atol=1e-6)
 
 
+@pytest.mark.parametrize("shape", [0.3, 0.5, 0.8])
+def test_a_cycle_of_a_law_steep_at_rest_repeats_to_the_accuracy_of_its_map(shape: float) -> None:
+    curve = replace(symmetric_robot().friction.positive, stribeck_shape=shape)
+    robot = replace(symmetric_robot(), friction=StribeckFriction.symmetric(curve))
+    where = section(1.1, robot=robot)
+    where = replace(where, loop=replace(where.loop, controller=replace(where.loop.controller, model=robot)))
+    cycle = cycle_of(where)
+    assert cycle.stable
+    run = simulate(where.loop, (0.5, 0.0, 0.0), duration=40.0, times=(), tolerance=1e-13)
+    halts = [abs(event.state[0]) for event in run.events if event.kind in ("stick", "velocity reversal")]
+    assert halts[-1] == pytest.approx(cycle.amplitude, rel=30 * where.accuracy)
+
+
 @pytest.mark.parametrize("shape", [0.8, 1.5])
 def test_other_shapes_have_cycles_too(shape: float) -> None:
     curve = replace(symmetric_robot().friction.positive, stribeck_shape=shape)

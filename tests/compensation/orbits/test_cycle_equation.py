@@ -25,6 +25,7 @@ class Line:
     map: Callable[[float], float]
     slope: Callable[[float], float]
     symmetric: bool = False
+    accuracy: float = 1e-11
     ends: float = np.inf  # beyond, there is no return
 
     def follow(self, point: FloatArray, returns: int) -> Returns:

@@ -15,6 +15,7 @@ class Logistic:
 
     r: float
     symmetric: bool = False
+    accuracy: float = 1e-11
 
     def follow(self, point: FloatArray, returns: int) -> Returns:
         points = []

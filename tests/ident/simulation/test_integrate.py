@@ -190,3 +190,77 @@ def test_a_halt_is_not_found_across_friction_that_no_stage_has_seen(width: float
     assert end.events == 1
     assert record.event_times[0] == pytest.approx(1.0 - width * lost(0), abs=slack)
     assert record.event_states[0] == pytest.approx([0.5 - width**2 * lost(1), 0.0], abs=slack)
+
+
+@compiled
+def dipping_field(signs: Signs, state: FloatArray, parameters: FloatArray, out: FloatArray) -> None:
+    """h'' = 2 on its own side of h = 0 and -2 beyond: a parabola that touches, or a way without return.
+
+    The third component is 1 throughout: what a tolerance is relative to.
+    """
+    out[0] = state[1]
+    out[1] = 2.0 * signs[0]
+    out[2] = 0.0
+
+
+@compiled
+def dipping_series(
+    signs: Signs, state: FloatArray, parameters: FloatArray, order: int, c: FloatArray, work: FloatArray
+) -> float:
+    for k in range(order + 1):
+        c[0, k] = c[1, k] = c[2, k] = 0.0
+    c[0, 0], c[0, 1], c[0, 2] = state[0], state[1], float(signs[0])
+    c[1, 0], c[1, 1], c[2, 0] = state[1], 2.0 * signs[0], state[2]
+    return np.inf
+
+
+DIPPING = FilippovSystem(passed(dipping_field), passed(dipping_series), passed(no_slide), passed(no_slide_at))
+
+
+@owning
+def dip_by_series(
+    settings: Settings, state: FloatArray, signs: Signs, contact: Signs, record: Record
+) -> Progress:
+    on, memory = (
+        Surfaces(np.array([[1.0, 0.0, 0.0, 0.0]]), np.array([0])),
+        np.full(memory_shape(3, 1), np.nan),
+    )
+    return integrate(TAYLOR, DIPPING, on, np.empty(0), settings, 0.0, state, signs, contact, record, memory)
+
+
+@owning
+def dip_by_dormand_prince(
+    settings: Settings, state: FloatArray, signs: Signs, contact: Signs, record: Record
+) -> Progress:
+    on, memory = (
+        Surfaces(np.array([[1.0, 0.0, 0.0, 0.0]]), np.array([0])),
+        np.full(memory_shape(3, 1), np.nan),
+    )
+    return integrate(
+        DORMAND_PRINCE, DIPPING, on, np.empty(0), settings, 0.0, state, signs, contact, record, memory
+    )
+
+
+@pytest.mark.parametrize("run", [dip_by_series, dip_by_dormand_prince])
+@pytest.mark.parametrize("side", [1, -1])
+@pytest.mark.parametrize(("depth", "ends"), [(-1e-9, 0.0), (1e-13, 0.0), (1e-11, 0.0), (1e-9, -1.0)])
+def test_a_crossing_shallower_than_the_tolerance_is_a_touch(
+    run: object, side: int, depth: float, ends: float
+) -> None:
+    """h = (t - 1)^2 - depth turns back at t = 1, or goes on beyond from t = 1 - root without return."""
+    assert callable(run)
+    record = Record(
+        np.array([2.0]), np.empty((1, 3)), np.empty(4), np.empty(4, np.int64), np.empty((4, 1), np.int64),
+        np.empty((4, 3)),
+    )  # fmt: skip
+    state, signs, contact = side * np.array([1.0 - depth, -2.0, 1.0]), np.array([side]), np.array([0])
+    end = run(Settings(1e-10, 2.0, 1000, -1, 0, 0), state, signs, contact, record)
+    root = np.sqrt(max(depth, 0.0))
+    after = 1.0 + root
+    expected = [1.0, 2.0] if ends == 0.0 else [-(after**2) - 2.0 * root * after, -2.0 * after - 2.0 * root]
+    assert end.reason == TIME_REACHED
+    assert end.events == (0 if depth < 0.0 else 1)
+    assert side * state[:2] == pytest.approx(expected, abs=1e-8)
+    assert end.time == 2.0
+    if end.events:
+        assert record.event_signs[0, 0] == (side if ends == 0.0 else -side)
