@@ -16,7 +16,7 @@ from compensation.closed_loop import ClosedLoop
 from compensation.loop_returns import carry_for
 from compensation.loop_runs import run_for
 from compensation.loop_section import PATIENCE, TOLERANCE, LoopSection, with_gain
-from compensation.loop_sweep import COLUMNS, FOUND, HIGH, LOW, PERIOD, SLOPE, UNDECIDED, sweep
+from compensation.loop_sweep import COLUMNS, FOUND, HALF_PERIOD, SLOPE, UNDECIDED, sweep
 from compensation.loop_tables import Parameter, tables_over
 from compensation.orbits.periodic_orbits import Cycle, NoCycle, find_cycle
 from ident.simulation.filippov_system import FloatArray
@@ -66,7 +66,7 @@ def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, cold: Float
         rows = np.empty((grid.size - here, COLUMNS))
         verdicts = np.empty(grid.size - here, np.int64)
         start = found[-1][0].point if found and found[-1] else cold
-        sweep(run, carried, tables[here:], True, TOLERANCE, PATIENCE, start, cold, rows, verdicts)
+        sweep(run, carried, grid[here:], tables[here:], TOLERANCE, PATIENCE, start, cold, rows, verdicts)
         undecided = np.flatnonzero(verdicts == UNDECIDED)
         done = int(undecided[0]) if undecided.size else verdicts.size
         cycles = iter(_cycles(rows[:done][verdicts[:done] == FOUND]))
@@ -84,26 +84,20 @@ def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, cold: Float
 
 
 def _cycles(rows: FloatArray) -> list[Cycle]:
-    """Rows of the kernel as symmetric cycles: their period is two returns."""
+    """Rows of the kernel as symmetric cycles: two returns make a period, and x1 is largest at its ends."""
     slopes = rows[:, SLOPE:].reshape(-1, 2, 2)
     multipliers = np.linalg.eigvals(slopes @ slopes).astype(np.complex128)
     order = np.argsort(-np.abs(multipliers), axis=1)
     multipliers = np.take_along_axis(multipliers, order, axis=1)
-    cycles = []
-    for row, largest_first, point in zip(rows.tolist(), multipliers.tolist(), rows[:, :2], strict=True):
-        amplitude = max(row[HIGH], -row[LOW])
-        cycles.append(
-            Cycle(
-                point=point,
-                returns=1,
-                period=2.0 * row[PERIOD],
-                x1_min=-amplitude,
-                x1_max=amplitude,
-                multipliers=tuple(largest_first),
-                stable=abs(largest_first[0]) < 1.0,
-            )
+    stable = np.abs(multipliers[:, 0]) < 1.0
+    amplitudes = np.abs(rows[:, 0])
+    columns = (amplitudes, 2.0 * rows[:, HALF_PERIOD], multipliers, stable)
+    return [
+        Cycle(point, 1, period, -amplitude, amplitude, tuple(largest_first), stable=is_stable)
+        for point, amplitude, period, largest_first, is_stable in zip(
+            rows[:, :2], *(column.tolist() for column in columns), strict=True
         )
-    return cycles
+    ]
 
 
 def _searched(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> list[list[Cycle]]:

@@ -45,7 +45,8 @@ class LoopSection:
         return is_analytic(self._parameters)
 
     @property
-    def _tolerance(self) -> float:
+    def tolerance(self) -> float:
+        """Of a step, relative to the largest state."""
         return TOLERANCE if self.by_series else TOLERANCE_ELSE
 
     def follow(self, point: FloatArray, returns: int) -> Returns:
@@ -57,7 +58,7 @@ class LoopSection:
         rows = np.empty((count, 5))
         parameters = self._parameters
         made, reason = returns(
-            run_for(parameters), parameters, self.symmetric, self._tolerance, PATIENCE, state, rows
+            run_for(parameters), parameters, self.symmetric, self.tolerance, PATIENCE, state, rows
         )
         rows = rows[:made]
         return Returns(rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], END_REASONS[reason])
@@ -67,14 +68,14 @@ class LoopSection:
         state = _state(point)
         slope = np.eye(2)
         run, carried = run_for(self._parameters), carry_for(self._parameters)
-        accuracy = (self._tolerance, self._tolerance, PATIENCE)
+        accuracy = (self.tolerance, self.tolerance, PATIENCE)
         for _ in range(MOST_HALTS):
             before = state[0]
-            once = np.empty((2, 2))
+            once = np.empty((3, 2))
             _, reason = derivative(run, carried, self._parameters, *accuracy, state, once)
             if reason != SECTION:
                 return None
-            slope = once @ slope
+            slope = once[:2] @ slope
             if self.symmetric:
                 return -slope
             if state[0] > before:
