@@ -100,7 +100,7 @@ def diagram(loop: ClosedLoop, parameter: Parameter, values: ArrayLike) -> Diagra
     pieces = rest_pieces(loop, parameter, grid)
     changes = list(_changes_of_equilibria(loop, parameter, grid, pieces))
     suspects = [change.value for change in changes]
-    bifurcations = [*_ends_of_cycles(loop, parameter, grid, chains, suspects), *changes]
+    bifurcations = [*changes, *_ends_of_cycles(loop, parameter, grid, chains, suspects)]
     return Diagram(
         parameter=parameter,
         gains=loop.controller.gains,
@@ -188,7 +188,7 @@ def _ends_of_cycles(
             cycle = chain.cycles[0 if begins else -1]
             interval = (float(grid[inner]), float(grid[outer]))
             last = last_cycle(loop, parameter, interval, cycle, suspects)
-            small = last.amplitude < CONTINUOUS * cycle.amplitude
+            small = last.cycle.amplitude < CONTINUOUS * cycle.amplitude
             word = "appears" if begins else "vanishes"
             yield Bifurcation(
                 last.value, f"limit cycle {word}, {'from zero amplitude' if small else 'with a jump'}"

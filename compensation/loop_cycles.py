@@ -15,10 +15,11 @@ import numpy as np
 from compensation.closed_loop import ClosedLoop
 from compensation.loop_returns import carry_for
 from compensation.loop_runs import run_for
-from compensation.loop_section import PATIENCE, TOLERANCE, LoopSection, with_gain
+from compensation.loop_section import PATIENCE, TOLERANCE, LoopSection
+from compensation.loop_settling import settled
 from compensation.loop_sweep import COLUMNS, FOUND, HALF_PERIOD, SLOPE, UNDECIDED, sweep
 from compensation.loop_tables import Parameter, tables_over
-from compensation.orbits.periodic_orbits import Cycle, NoCycle, find_cycle
+from compensation.orbits.periodic_orbits import Cycle, NoCycle
 from ident.simulation.filippov_system import FloatArray
 
 STARTS: Final = (0.6, -0.6, 0.1, -0.1)  # x1(0) [rad] from which cycles are looked for
@@ -42,11 +43,7 @@ def stable_cycles(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> l
 
 def cycle_near(loop: ClosedLoop, parameter: Parameter, value: float, cycle: Cycle) -> Cycle | NoCycle:
     """The cycle at a value of the gain to which another value's cycle leads."""
-    section = LoopSection(with_gain(loop, parameter, value))
-    if section.symmetric and section.by_series and cycle.returns == 1:
-        (found,) = _swept(loop, parameter, np.array([value]), cycle.point)
-        return found[0] if found else NoCycle("leads to no stable cycle")
-    return find_cycle(section, cycle.point)
+    return settled(loop, parameter, value, cycle.point)
 
 
 def distance(one: Cycle, other: Cycle) -> float:
@@ -77,8 +74,7 @@ def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, cold: Float
         if len(found) < grid.size:
             known: list[Cycle] = []
             point = found[-1][0].point if found and found[-1] else cold
-            section = LoopSection(with_gain(loop, parameter, float(grid[len(found)])))
-            _add(known, find_cycle(section, point))
+            _add(known, settled(loop, parameter, float(grid[len(found)]), point))
             found.append(known)
     return found
 
@@ -101,17 +97,14 @@ def _cycles(rows: FloatArray) -> list[Cycle]:
 
 
 def _searched(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> list[list[Cycle]]:
+    symmetric = LoopSection(loop).symmetric
+    cold = [np.array([x1, 0.0]) for x1 in (STARTS[:1] if symmetric else STARTS)]
     found: list[list[Cycle]] = []
     for value in grid.tolist():
-        section = LoopSection(with_gain(loop, parameter, value))
-        known: list[Cycle] = []
         warm = [cycle.point for cycle in found[-1]] if found else []
-        cold = STARTS[:1] if section.symmetric else STARTS
-        for point in warm:
-            _add(known, find_cycle(section, point))
-        if not (section.symmetric and warm):
-            for x1 in cold:
-                _add(known, find_cycle(section, np.array([x1, 0.0])))
+        known: list[Cycle] = []
+        for point in warm if symmetric and warm else [*warm, *cold]:
+            _add(known, settled(loop, parameter, value, point))
         found.append(known)
     return found
 

@@ -197,6 +197,14 @@ def derivative(
     return end.time, SECTION
 
 
+@compiled
+def newton_change(slope: FloatArray, missing1: float, missing2: float) -> tuple[float, float]:
+    """Newton's change of a point (2,) that its return misses, towards the fixed point: (1 - slope) change."""
+    a, b, c, d = 1.0 - slope[0, 0], -slope[0, 1], -slope[1, 0], 1.0 - slope[1, 1]
+    determinant = a * d - b * c
+    return (d * missing1 - b * missing2) / determinant, (a * missing2 - c * missing1) / determinant
+
+
 @owning
 def _rate(parameters: FloatArray, mode: Signs, state: FloatArray, out: FloatArray) -> None:
     """dx/dt (3,) in a slip mode or, the velocity held at zero, in a stick."""

@@ -16,11 +16,12 @@ from compensation.orbits.periodic_orbits import Returns
 from ident.model.friction import StribeckFriction
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
-from ident.simulation.integrate import END_REASONS, SECTION
+from ident.simulation.integrate import END_REASONS, EQUILIBRIUM, SECTION
 
 TOLERANCE: Final = 1e-13  # of a step; series lose nothing by it
 TOLERANCE_ELSE: Final = 1e-11  # of a Dormand-Prince step
 GAIN_NAMES: Final = {"r": "compensation", "L": "observer", "n1": "proportional", "n2": "derivative"}
+STILL: Final = 1e-8  # of x1, by which a link still moves that closes in on the edge of an equilibrium set
 PATIENCE: Final = 200.0  # [s] for one half turn
 
 
@@ -60,11 +61,14 @@ class LoopSection:
         made, reason = returns(
             run_for(parameters), parameters, self.symmetric, self.tolerance, PATIENCE, state, rows
         )
+        still = rows[:made, 4] - rows[:made, 3] <= STILL * np.abs(rows[:made, 0])
+        if still.any():
+            made, reason = int(np.argmax(still)), EQUILIBRIUM
         rows = rows[:made]
         return Returns(rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], END_REASONS[reason])
 
     def derivative(self, point: FloatArray) -> FloatArray | None:
-        """Derivative (2, 2) of one return from a point (2,)."""
+        """Derivative (2, 2) of one return from a point (2,), None where it grazes a surface."""
         state = _state(point)
         slope = np.eye(2)
         run, carried = run_for(self._parameters), carry_for(self._parameters)
@@ -73,7 +77,7 @@ class LoopSection:
             before = state[0]
             once = np.empty((3, 2))
             _, reason = derivative(run, carried, self._parameters, *accuracy, state, once)
-            if reason != SECTION:
+            if reason != SECTION or not np.all(np.isfinite(once)):
                 return None
             slope = once[:2] @ slope
             if self.symmetric:

@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from compensation.loop_returns import derivative, returns
+from compensation.loop_returns import derivative, newton_change, returns
 from ident.simulation.compiled import compiled, owning
 from ident.simulation.filippov_system import FloatArray, Signs, assign
 from ident.simulation.integrate import SECTION
@@ -32,6 +32,7 @@ DEFINITE: Final = 1e-3  # relative distance within which a derivative is worth i
 CONTRACTS: Final = 0.5  # norm of a derivative with which Newton's method is safe
 MOST_RETURNS: Final = 8
 MOST_KNOWN: Final = 6  # points that a guess is made from
+ROUGH: Final = 1e-9  # tolerance of a step on the way to a point that is nearly known
 TANGENT_TOLERANCE: Final = 1e-9  # of a step of the derivative, against the multipliers' absolute 1e-8
 
 
@@ -131,9 +132,10 @@ def cycle_from(
                 return LEADS_ELSEWHERE, missed
             row[X1], row[X2], row[HALF_PERIOD] = -state[0], -state[1], duration
             for i in range(2):
-                row[SLOPE + i], row[SLOPE + 2 + i] = -slope[0, i], -slope[1, i]
+                slope[0, i], slope[1, i] = -slope[0, i], -slope[1, i]
+                row[SLOPE + i], row[SLOPE + 2 + i] = slope[0, i], slope[1, i]
         else:
-            made, _ = returns(run, table, True, tolerance, patience, state, points)
+            made, _ = returns(run, table, True, max(tolerance, ROUGH), patience, state, points)
             if made == 0:
                 return LEADS_ELSEWHERE, missed
             row[X1], row[X2] = points[0, 0], points[0, 1]
@@ -142,8 +144,8 @@ def cycle_from(
         if turn == 0:
             missed = apart
         if by_derivative and apart <= DEFINITE:
-            steep = _norm(row)
-            settled = apart <= CLOSE and apart * min(steep, 1.0) <= REPEATS
+            steep = _norm(slope)
+            settled = apart <= CLOSE and apart * min(steep, 1.0) <= REPEATS and steep < inf
             if settled or steep <= CONTRACTS:
                 _correct(here, slope, row)
             if settled:
@@ -153,20 +155,16 @@ def cycle_from(
 
 
 @compiled
-def _norm(row: FloatArray) -> float:
+def _norm(slope: FloatArray) -> float:
     """The largest stretch of the derivative, in the maximum norm."""
-    first = abs(row[SLOPE]) + abs(row[SLOPE + 1])
-    second = abs(row[SLOPE + 2]) + abs(row[SLOPE + 3])
+    first, second = abs(slope[0, 0]) + abs(slope[0, 1]), abs(slope[1, 0]) + abs(slope[1, 1])
     norm: float = max(first, second)
     return norm
 
 
 @compiled
 def _correct(here: FloatArray, slope: FloatArray, row: FloatArray) -> None:
-    """One Newton step on the fixed point: (1 - slope) change = return - point; the duration follows."""
-    a, b, c, d = 1.0 - row[SLOPE], -row[SLOPE + 1], -row[SLOPE + 2], 1.0 - row[SLOPE + 3]
-    first, second = row[X1] - here[0], row[X2] - here[1]
-    determinant = a * d - b * c
-    change1, change2 = (d * first - b * second) / determinant, (a * second - c * first) / determinant
+    """One Newton step from `here` (2,) to the fixed point; the duration follows."""
+    change1, change2 = newton_change(slope, row[X1] - here[0], row[X2] - here[1])
     row[X1], row[X2] = here[0] + change1, here[1] + change2
     row[HALF_PERIOD] += slope[2, 0] * change1 + slope[2, 1] * change2

@@ -28,17 +28,17 @@ def test_cycles_shrink_to_nothing_where_the_set_point_loses_its_stability(suspec
     """Below 1 + 1.1e-5 the cycle is not symmetric any more, but there is one down to 1."""
     last = last_cycle(paper(), "r", (1.01, 0.99), cycle_at(paper(), 1.01), suspects)
     assert 1.0 < last.value <= 1.0 + 0.02 * FINE
-    assert last.amplitude < 1e-5
+    assert last.cycle.amplitude < 1e-5
 
 
 def test_a_branch_that_ends_with_a_jump() -> None:
     loop = ClosedLoop(asymmetric_robot(), Controller(GAINS, symmetric_robot()))
     last = last_cycle(loop, "r", (1.0, 0.99), cycle_at(loop, 1.0), [])
-    assert last.amplitude > 0.1
-    inside = find_cycle(LoopSection(with_gain(loop, "r", last.value)), last.point)
+    assert last.cycle.amplitude > 0.1
+    inside = find_cycle(LoopSection(with_gain(loop, "r", last.value)), last.cycle.point)
     assert isinstance(inside, Cycle)
-    assert inside.amplitude == pytest.approx(last.amplitude, rel=1e-7)
-    beyond = find_cycle(LoopSection(with_gain(loop, "r", last.value - 0.01 * FINE)), last.point)
+    assert inside.amplitude == pytest.approx(last.cycle.amplitude, rel=1e-7)
+    beyond = find_cycle(LoopSection(with_gain(loop, "r", last.value - 0.01 * FINE)), last.cycle.point)
     assert not isinstance(beyond, Cycle)
 
 
