@@ -13,8 +13,7 @@ from typing import Final
 import numpy as np
 
 from compensation.closed_loop import ClosedLoop
-from compensation.loop_returns import carry_for
-from compensation.loop_runs import run_for
+from compensation.loop_returns import map_kernels
 from compensation.loop_section import PATIENCE, TOLERANCE, LoopSection
 from compensation.loop_settling import settled
 from compensation.loop_sweep import COLUMNS, FOUND, HALF_PERIOD, SLOPE, UNDECIDED, sweep
@@ -56,14 +55,14 @@ def distance(one: Cycle, other: Cycle) -> float:
 def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, cold: FloatArray) -> list[list[Cycle]]:
     """Of a symmetric loop: at most one cycle a value, from the one before or else from `cold` (2,)."""
     tables = tables_over(loop.robot, loop.controller, parameter, grid)
-    run, carried = run_for(tables[0]), carry_for(tables[0])
+    kernels = map_kernels(tables[0])
     found: list[list[Cycle]] = []
     while len(found) < grid.size:
         here = len(found)
         rows = np.empty((grid.size - here, COLUMNS))
         verdicts = np.empty(grid.size - here, np.int64)
         start = found[-1][0].point if found and found[-1] else cold
-        sweep(run, carried, grid[here:], tables[here:], TOLERANCE, PATIENCE, start, cold, rows, verdicts)
+        sweep(kernels, grid[here:], tables[here:], TOLERANCE, PATIENCE, start, cold, rows, verdicts)
         undecided = np.flatnonzero(verdicts == UNDECIDED)
         done = int(undecided[0]) if undecided.size else verdicts.size
         cycles = iter(_cycles(rows[:done][verdicts[:done] == FOUND]))

@@ -13,13 +13,13 @@ matrices are well defined, but differences of neighbouring trajectories lose man
 from __future__ import annotations
 
 from functools import cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
-from numba import float64, int64, types
+from numba import boolean, float64, int64, types
 
 from compensation.loop_modes import MOTION, SURFACE_ROWS, SYSTEM
-from compensation.loop_runs import begin, is_analytic, run_at
+from compensation.loop_runs import begin, is_analytic, run_at, run_for
 from compensation.loop_tangents import DEVIATIONS, ROW1, ROW2, ROW3, STATES, TANGENTS, stick_deviations
 from compensation.orbits.saltation import carry, project_along, saltate
 from ident.simulation.compiled import address_of, calls, compiled, owning
@@ -37,6 +37,23 @@ CARRY: Final = types.void(
     float64[:, ::1], int64[::1], float64[::1], float64, float64, float64[:, ::1], float64[:, ::1]
 )
 carry_at: Final = calls(CARRY)  # carry_at(address, arguments of `carry_by_series`)
+RETURNS: Final = types.UniTuple(int64, 2)(  # type: ignore[no-untyped-call]  # numba
+    int64, float64[:, ::1], boolean, float64, float64, float64[::1], float64[:, ::1]
+)
+returns_at: Final = calls(RETURNS)  # returns_at(address, arguments of `returns`)
+DERIVATIVE: Final = types.Tuple((float64, int64))(  # type: ignore[no-untyped-call]  # numba
+    int64, int64, float64[:, ::1], float64, float64, float64, float64[::1], float64[:, ::1]
+)
+derivative_at: Final = calls(DERIVATIVE)  # derivative_at(address, arguments of `derivative`)
+
+
+class MapKernels(NamedTuple):
+    """Addresses of what follows a loop's return map: searches for cycles need not be compiled with it."""
+
+    run: int
+    carried: int
+    returns: int
+    derivative: int
 
 
 @compiled
@@ -75,6 +92,16 @@ def carry_for(parameters: FloatArray) -> int:
 @cache
 def _carry_address(analytic: bool) -> int:
     return address_of(carry_by_series if analytic else carry_by_dormand_prince, CARRY)
+
+
+def map_kernels(parameters: FloatArray) -> MapKernels:
+    """The kernels for a loop with these parameters (6, 16)."""
+    return MapKernels(run_for(parameters), carry_for(parameters), *_map_addresses())
+
+
+@cache
+def _map_addresses() -> tuple[int, int]:
+    return address_of(returns, RETURNS), address_of(derivative, DERIVATIVE)
 
 
 @owning

@@ -13,8 +13,14 @@ import numpy as np
 
 from compensation.closed_loop import ClosedLoop
 from compensation.loop_parameters import COLUMNS, ROWS, mode_table
-from compensation.loop_returns import MOST_HALTS, carry_for, derivative, newton_change, returns
-from compensation.loop_runs import run_for
+from compensation.loop_returns import (
+    MOST_HALTS,
+    MapKernels,
+    derivative_at,
+    map_kernels,
+    newton_change,
+    returns_at,
+)
 from compensation.loop_section import PATIENCE, STILL, LoopSection, with_gain
 from compensation.loop_sweep import CLOSE, TANGENT_TOLERANCE
 from compensation.loop_tables import COLUMN_OF, Parameter, gain_row, laws_of, mode_parameters
@@ -48,7 +54,7 @@ def settled(loop: ClosedLoop, parameter: Parameter, value: float, start: FloatAr
     gains[COLUMN_OF[parameter]] = value
     row = np.empty(NUMBERS)
     period = settle(
-        run_for(parameters), carry_for(parameters), laws, inertia, gains, section.symmetric,
+        map_kernels(parameters), laws, inertia, gains, section.symmetric,
         section.tolerance, PATIENCE, start, row,
     )  # fmt: skip
     if period == NOWHERE:
@@ -62,8 +68,7 @@ def settled(loop: ClosedLoop, parameter: Parameter, value: float, start: FloatAr
 
 @owning
 def settle(
-    run: int,
-    carried: int,
+    kernels: MapKernels,
     laws: FloatArray,
     inertia: FloatArray,
     gains: FloatArray,
@@ -77,8 +82,8 @@ def settle(
 
     NOWHERE where it leads to no cycle; UNDECIDED where it does not repeat soon, and `row` (NUMBERS,) begins
     with the point reached. Otherwise `row` tells of the cycle: as it is over that many returns, in the frame
-    of the first. Laws, inertia and gains are those of `loop_parameters.mode_table`, `run` and `carried` the
-    addresses of the loop's kernels.
+    of the first. Laws, inertia and gains are those of `loop_parameters.mode_table`, `kernels` those of
+    the loop.
     """
     table, state, points = np.zeros((ROWS, COLUMNS)), np.empty(3), np.empty((MOST_RETURNS, 5))
     mode_table(laws, inertia, gains, table)
@@ -86,14 +91,17 @@ def settle(
     small = VANISHED * max(abs(start[0]), abs(start[1]))
     for made in range(MOST_RETURNS):
         state[0], state[1], state[2] = row[X1], row[X2], -row[X2]
-        count, _ = returns(run, table, symmetric, tolerance, patience, state, points[made : made + 1])
+        count, _ = returns_at(
+            kernels.returns,
+            (kernels.run, table, symmetric, tolerance, patience, state, points[made : made + 1]),
+        )
         row[X1], row[X2] = points[made, 0], points[made, 1]
         size = max(abs(row[X1]), abs(row[X2]))
         if count == 0 or size <= small:
             return NOWHERE
         for back in range(1, min(MOST_TURNS, made) + 1):
             if _apart(points[made - back], row) <= REPEATS * size:
-                return _complete(run, carried, table, symmetric, tolerance, patience, back, row)
+                return _complete(kernels, table, symmetric, tolerance, patience, back, row)
     return UNDECIDED
 
 
@@ -104,8 +112,7 @@ def _apart(point: FloatArray, row: FloatArray) -> float:
 
 @owning
 def _complete(
-    run: int,
-    carried: int,
+    kernels: MapKernels,
     table: FloatArray,
     symmetric: bool,
     tolerance: float,
@@ -115,7 +122,7 @@ def _complete(
 ) -> int:
     """The `row` of a cycle of `count` returns from a point near it: their number, or as for `settle`."""
     for _ in range(MOST_CORRECTIONS):
-        found, changed = _period(run, carried, table, symmetric, tolerance, patience, count, row)
+        found, changed = _period(kernels, table, symmetric, tolerance, patience, count, row)
         if found != count or changed <= SAME:
             return found
     return UNDECIDED
@@ -123,8 +130,7 @@ def _complete(
 
 @owning
 def _period(
-    run: int,
-    carried: int,
+    kernels: MapKernels,
     table: FloatArray,
     symmetric: bool,
     tolerance: float,
@@ -138,7 +144,7 @@ def _period(
     slope[0, 0] = slope[1, 1] = 1.0
     low, high, extent, duration, side = np.inf, -np.inf, 0.0, 0.0, 1.0
     for _ in range(count):
-        spent, lowest, highest = _turn(run, carried, table, symmetric, tolerance, patience, state, slope)
+        spent, lowest, highest = _turn(kernels, table, symmetric, tolerance, patience, state, slope)
         if not spent < np.inf:
             return UNDECIDED, np.inf
         duration += spent
@@ -162,8 +168,7 @@ def _period(
 
 @owning
 def _turn(
-    run: int,
-    carried: int,
+    kernels: MapKernels,
     table: FloatArray,
     symmetric: bool,
     tolerance: float,
@@ -181,7 +186,10 @@ def _turn(
     sign = -1.0 if symmetric else 1.0
     for _ in range(MOST_HALTS):
         before = state[0]
-        spent, reason = derivative(run, carried, table, tolerance, TANGENT_TOLERANCE, patience, state, once)
+        spent, reason = derivative_at(
+            kernels.derivative,
+            (kernels.run, kernels.carried, table, tolerance, TANGENT_TOLERANCE, patience, state, once),
+        )
         if reason != SECTION:
             break
         duration += spent

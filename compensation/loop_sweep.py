@@ -16,7 +16,7 @@ from typing import Final
 
 import numpy as np
 
-from compensation.loop_returns import derivative, newton_change, returns
+from compensation.loop_returns import MapKernels, derivative_at, newton_change, returns_at
 from ident.simulation.compiled import compiled, owning
 from ident.simulation.filippov_system import FloatArray, Signs, assign
 from ident.simulation.integrate import SECTION
@@ -38,8 +38,7 @@ TANGENT_TOLERANCE: Final = 1e-9  # of a step of the derivative, against the mult
 
 @owning
 def sweep(
-    run: int,
-    carried: int,
+    kernels: MapKernels,
     values: FloatArray,
     tables: FloatArray,
     tolerance: float,
@@ -51,7 +50,7 @@ def sweep(
 ) -> None:
     """The cycle at each of n ascending values, from those before or else from `cold` (2,): rows (n, COLUMNS).
 
-    The first value starts from `first` (2,). `run` and `carried` are the addresses of the loop's kernels.
+    The first value starts from `first` (2,). `kernels` are those of the loop.
 
     `tables` (n, 6, 16) are the parameters of `loop_parameters` at the `values` (n,) of a gain; verdicts (n,)
     are those named above. The sweep ends at the first value that stays undecided.
@@ -68,12 +67,10 @@ def sweep(
         elif value > 0:
             assign(guess, cold)
         row = rows[value]
-        verdict, missed = cycle_from(
-            run, carried, tables[value], tolerance, patience, guess, missed <= CLOSE, row
-        )
+        verdict, missed = cycle_from(kernels, tables[value], tolerance, patience, guess, missed <= CLOSE, row)
         if verdict == LEADS_ELSEWHERE and known > 0:
             assign(guess, rows[value - 1, :2])  # the branch may bend more than its guess
-            verdict, missed = cycle_from(run, carried, tables[value], tolerance, patience, guess, False, row)
+            verdict, missed = cycle_from(kernels, tables[value], tolerance, patience, guess, False, row)
         verdicts[value] = verdict
         if verdict == UNDECIDED:
             return
@@ -103,8 +100,7 @@ def extrapolate(
 
 @owning
 def cycle_from(
-    run: int,
-    carried: int,
+    kernels: MapKernels,
     table: FloatArray,
     tolerance: float,
     patience: float,
@@ -125,8 +121,9 @@ def cycle_from(
         state[0], state[1], state[2] = here[0], here[1], -here[1]
         by_derivative = apart <= DEFINITE
         if by_derivative:
-            duration, reason = derivative(
-                run, carried, table, tolerance, TANGENT_TOLERANCE, patience, state, slope
+            duration, reason = derivative_at(
+                kernels.derivative,
+                (kernels.run, kernels.carried, table, tolerance, TANGENT_TOLERANCE, patience, state, slope),
             )
             if reason != SECTION:
                 return LEADS_ELSEWHERE, missed
@@ -135,7 +132,9 @@ def cycle_from(
                 slope[0, i], slope[1, i] = -slope[0, i], -slope[1, i]
                 row[SLOPE + i], row[SLOPE + 2 + i] = slope[0, i], slope[1, i]
         else:
-            made, _ = returns(run, table, True, max(tolerance, ROUGH), patience, state, points)
+            made, _ = returns_at(
+                kernels.returns, (kernels.run, table, True, max(tolerance, ROUGH), patience, state, points)
+            )
             if made == 0:
                 return LEADS_ELSEWHERE, missed
             row[X1], row[X2] = points[0, 0], points[0, 1]
