@@ -55,27 +55,35 @@ def distance(one: Cycle, other: Cycle) -> float:
 def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, cold: FloatArray) -> list[list[Cycle]]:
     """Of a symmetric loop: at most one cycle a value, from the one before or else from `cold` (2,)."""
     tables = tables_over(loop.robot, loop.controller, parameter, grid)
-    kernels = map_kernels(tables[0])
     found: list[list[Cycle]] = []
     while len(found) < grid.size:
-        here = len(found)
-        rows = np.empty((grid.size - here, COLUMNS))
-        verdicts = np.empty(grid.size - here, np.int64)
-        start = found[-1][0].point if found and found[-1] else cold
-        sweep(kernels, grid[here:], tables[here:], TOLERANCE, PATIENCE, start, cold, rows, verdicts)
-        undecided = np.flatnonzero(verdicts == UNDECIDED)
-        done = int(undecided[0]) if undecided.size else verdicts.size
-        cycles = iter(_cycles(rows[:done][verdicts[:done] == FOUND]))
-        found.extend(
-            [cycle] if verdict == FOUND and (cycle := next(cycles)).stable else []
-            for verdict in verdicts[:done].tolist()
-        )
+        if not (found and found[-1] and found[-1][0].returns > 1):
+            here = len(found)
+            found.extend(_decided(grid[here:], tables[here:], _start(found, cold), cold))
         if len(found) < grid.size:
             known: list[Cycle] = []
-            point = found[-1][0].point if found and found[-1] else cold
-            _add(known, settled(loop, parameter, float(grid[len(found)]), point))
+            _add(known, settled(loop, parameter, float(grid[len(found)]), _start(found, cold)))
             found.append(known)
     return found
+
+
+def _start(found: list[list[Cycle]], cold: FloatArray) -> FloatArray:
+    return found[-1][0].point if found and found[-1] else cold
+
+
+def _decided(
+    values: FloatArray, tables: FloatArray, start: FloatArray, cold: FloatArray
+) -> list[list[Cycle]]:
+    """The cycles at as many of the values (n,) as the kernel decides upon."""
+    rows, verdicts = np.empty((values.size, COLUMNS)), np.empty(values.size, np.int64)
+    sweep(map_kernels(tables[0]), values, tables, TOLERANCE, PATIENCE, start, cold, rows, verdicts)
+    undecided = np.flatnonzero(verdicts == UNDECIDED)
+    done = int(undecided[0]) if undecided.size else verdicts.size
+    cycles = iter(_cycles(rows[:done][verdicts[:done] == FOUND]))
+    return [
+        [cycle] if verdict == FOUND and (cycle := next(cycles)).stable else []
+        for verdict in verdicts[:done].tolist()
+    ]
 
 
 def _cycles(rows: FloatArray) -> list[Cycle]:

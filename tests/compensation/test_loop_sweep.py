@@ -23,6 +23,7 @@ def loop(observer: float) -> ClosedLoop:
     [
         (73.5, np.linspace(1.0, 1.2, 41)[1:]),
         (73.5, 1.0 + np.geomspace(2e-5, 0.1, 25)),  # crowded near 1
+        (73.5, 1.0 + np.geomspace(1e-7, 1e-4, 12)),  # below 1.1e-5 two returns, not symmetric
         (120.0, np.linspace(1.0005, 1.002, 31)),  # half-map multipliers of 0.1
         (73.5, np.array([1.1])),
     ],
