@@ -42,14 +42,16 @@ def last_cycle(
     probes = _probes(interval, suspects)
     last = LastCycle(inside, cycle)
     while abs(outside - last.value) > fine:
-        value = next(probes, 0.5 * (last.value + outside))
-        if not min(last.value, outside) < value < max(last.value, outside):
-            continue
-        found = settled(loop, parameter, value, last.cycle.point)
-        if isinstance(found, Cycle) and found.stable:
-            last = LastCycle(value, found)
-        else:
-            outside = value
+        probe = next(probes, None)
+        value = 0.5 * (last.value + outside) if probe is None else probe
+        if min(last.value, outside) < value < max(last.value, outside):
+            found = settled(loop, parameter, value, last.cycle.point)
+            if isinstance(found, Cycle) and found.stable:
+                last = LastCycle(value, found)
+            else:
+                outside = value
+        elif probe is None:
+            break  # between neighbouring numbers there is nothing
     return last
 
 

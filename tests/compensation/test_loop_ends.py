@@ -49,3 +49,9 @@ def test_a_suspect_that_is_none_does_no_harm() -> None:
     for suspect in (0.9905, 0.9999, 1.2):
         other = last_cycle(loop, "r", (1.0, 0.99), cycle, [suspect])
         assert other.value == pytest.approx(plain.value, abs=0.02 * FINE)
+
+
+def test_between_neighbouring_numbers_there_is_nothing_to_find() -> None:
+    outside = float(np.nextafter(1.01, 0.0))
+    last = last_cycle(paper(), "r", (1.01, outside), cycle_at(paper(), 1.01), [outside, 1.01])
+    assert last.value == 1.01
