@@ -143,14 +143,29 @@ def _many(quick: bool) -> list[Row]:
 
 
 def _diagrams(quick: bool) -> list[Row]:
+    """Two sizes in turns, and one run of the fastest peer, by which other machines can be compared."""
+
     def draw(points: int) -> None:
         diagram(LOOP, "r", np.linspace(0.8, 1.2, points))
 
-    small, large = in_turns(
-        [partial(draw, 200), partial(draw, 5000)], rounds=3 if quick else 9, repeats=(5, 1)
-    )
+    runs: list[Callable[[], object]] = [partial(draw, 200), partial(draw, 5000)]
+    repeats = [5, 1]
+    try:
+        from benchmarks.numbalsoda_peer import single  # noqa: PLC0415  # a peer that may be missing
+    except ImportError as missing:
+        peer_rows = [without_peer("200-point diagram", FASTEST, str(missing))]
+    else:
+        runs.append(partial(single(TIMES, tolerance=ACCURACIES[0][2]), START, R))
+        repeats.append(20)
+        peer_rows = []
+    small, large, *peer = in_turns(runs, rounds=3 if quick else 9, repeats=repeats)
+    case = "200-point diagram"
     return [
-        figure("200-point diagram", 1e3 * small, 15.0, "ms"),
+        figure(case, 1e3 * small, 15.0, "ms"),
+        *(figure(f"{case}, single runs of {FASTEST}", small / one, None, "-") for one in peer),
+        *peer_rows,
+        figure(f"{case}, a point", 1e6 * small / 200.0, None, "us"),
+        figure("5000-point diagram, a point", 1e6 * large / 5000.0, None, "us"),
         figure("5000-point diagram, cost of a point beside 200's", large / small / 25.0, 1.2, "-"),
     ]
 

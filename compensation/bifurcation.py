@@ -2,15 +2,14 @@
 
 For every value of the parameter the equilibrium sets come from their closed form (`rest_pieces`) and
 the limit cycles from the return map on v = 0 (`loop_cycles`). The points at which branches begin and
-end are refined by bisection.
+end are bracketed much closer than the values are (`loop_ends`).
 
 Amplitude is max|x1| over a period, everywhere.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal
 
@@ -19,21 +18,26 @@ from numpy.typing import ArrayLike
 
 from compensation.closed_loop import ClosedLoop, simulate
 from compensation.controller import Gains
-from compensation.loop_cycles import cycle_near, distance, stable_cycles
+from compensation.loop_cycles import distance, stable_cycles
+from compensation.loop_ends import last_cycle
 from compensation.loop_section import LoopSection, with_gain
 from compensation.loop_tables import Parameter
 from compensation.orbits.periodic_orbits import Cycle, find_cycle
 from compensation.orbits.steady_state import SteadyState, classify
-from compensation.rest_pieces import SET_POINT, PieceName, Pieces, rest_pieces
+from compensation.rest_pieces import (
+    SET_POINT,
+    PieceName,
+    Pieces,
+    change_between,
+    present,
+    rest_pieces,
+)
 from ident.model.friction import ModelError
 from ident.simulation.filippov_system import FloatArray
 
 Kind = Literal["equilibrium_set", "equilibrium", "limit_cycle"]
 
 ONE_CHANGE: Final = 1e-9  # relative distance at which two changes are one
-SECTIONS: Final = 32  # into which an interval with a change of the equilibria is cut
-EQUILIBRIUM_REFINEMENTS: Final = 9  # times: 45 bisections in fewer calls
-REFINEMENTS: Final = 12  # bisections of the ends of a branch
 CONTINUOUS: Final = 0.25  # amplitude at an onset, relative to the next point, below which it grows from zero
 SAMPLES: Final = 4000  # of a trajectory that is classified by its samples
 
@@ -94,10 +98,9 @@ def diagram(loop: ClosedLoop, parameter: Parameter, values: ArrayLike) -> Diagra
     chains = chained(stable_cycles(loop, parameter, grid))
     cycles = [_cycle_branch(chain, grid) for chain in chains]
     pieces = rest_pieces(loop, parameter, grid)
-    bifurcations = [
-        *_ends_of_cycles(loop, parameter, grid, chains),
-        *_changes_of_equilibria(loop, parameter, grid, pieces),
-    ]
+    changes = list(_changes_of_equilibria(loop, parameter, grid, pieces))
+    suspects = [change.value for change in changes]
+    bifurcations = [*changes, *_ends_of_cycles(loop, parameter, grid, chains, suspects)]
     return Diagram(
         parameter=parameter,
         gains=loop.controller.gains,
@@ -170,75 +173,63 @@ def _cycle_branch(chain: Chain, grid: FloatArray) -> Branch:
 
 
 def _ends_of_cycles(
-    loop: ClosedLoop, parameter: Parameter, grid: FloatArray, chains: Sequence[Chain]
+    loop: ClosedLoop,
+    parameter: Parameter,
+    grid: FloatArray,
+    chains: Sequence[Chain],
+    suspects: Sequence[float],
 ) -> Iterator[Bifurcation]:
-    """Where branches of cycles begin or end inside the grid, by bisection."""
+    """Where branches of cycles begin or end inside the grid; `suspects` are looked at first."""
     for chain in chains:
         for inner, outer in ((chain.first, chain.first - 1), (chain.last, chain.last + 1)):
             if not 0 <= outer < grid.size:
                 continue
             begins = outer < inner
             cycle = chain.cycles[0 if begins else -1]
-            size = cycle.amplitude
-            good, bad = float(grid[inner]), float(grid[outer])
-            for _ in range(REFINEMENTS):
-                middle = 0.5 * (good + bad)
-                next_cycle = cycle_near(loop, parameter, middle, cycle)
-                if isinstance(next_cycle, Cycle) and next_cycle.stable:
-                    good, cycle = middle, next_cycle
-                else:
-                    bad = middle
-            small = cycle.amplitude < CONTINUOUS * size
+            interval = (float(grid[inner]), float(grid[outer]))
+            last = last_cycle(loop, parameter, interval, cycle, suspects)
+            small = last.cycle.amplitude < CONTINUOUS * cycle.amplitude
             word = "appears" if begins else "vanishes"
             yield Bifurcation(
-                good, f"limit cycle {word}, {'from zero amplitude' if small else 'with a jump'}"
+                last.value, f"limit cycle {word}, {'from zero amplitude' if small else 'with a jump'}"
             )
 
 
-def _equilibrium_branches(grid: FloatArray, pieces: Sequence[Pieces]) -> list[Branch]:
+def _equilibrium_branches(grid: FloatArray, pieces: Pieces) -> list[Branch]:
     """Equilibrium sets, piece by piece, and the set point where it stands alone."""
-    open_branches: dict[tuple[str, bool], list[Point]] = {}
     branches: list[Branch] = []
-
-    def close(key: tuple[str, bool]) -> None:
-        kind: Kind = "equilibrium" if key[0] == SET_POINT else "equilibrium_set"
-        branches.append(Branch(kind, key[1], tuple(open_branches.pop(key))))
-
-    for here, value in zip(pieces, grid.tolist(), strict=True):
-        for key in [key for key in open_branches if key not in here]:
-            close(key)
-        for key, (low, high) in here.items():
-            point = Point(value, low, high, max(abs(low), abs(high)))
-            open_branches.setdefault(key, []).append(point)
-    for key in list(open_branches):
-        close(key)
+    for (name, stable), ranges in pieces.items():
+        kind: Kind = "equilibrium" if name == SET_POINT else "equilibrium_set"
+        there = np.flatnonzero(~np.isnan(ranges[:, 0]))
+        for run in np.split(there, np.flatnonzero(np.diff(there) > 1) + 1):
+            amplitudes = np.max(np.abs(ranges[run]), axis=1)
+            columns = (grid[run], *ranges[run].T, amplitudes)
+            points = tuple(map(Point, *(column.tolist() for column in columns)))
+            branches.append(Branch(kind, stable, points))
     return sorted(branches, key=lambda branch: branch.points[0].value)
 
 
 def _changes_of_equilibria(
-    loop: ClosedLoop, parameter: Parameter, grid: FloatArray, pieces: Sequence[Pieces]
+    loop: ClosedLoop, parameter: Parameter, grid: FloatArray, pieces: Pieces
 ) -> Iterator[Bifurcation]:
-    """Where pieces of the equilibrium set appear, vanish or leave the set point, by cutting intervals.
+    """Where pieces of the equilibrium set appear, vanish or leave the set point, by bisection.
 
     Changes within rounding of each other are one: a grid value may lie on the change itself.
     """
-    changes: list[tuple[float, Set[PieceName], Set[PieceName]]] = []
-    for (low, high), (left, right) in zip(
-        itertools.pairwise(grid.tolist()), itertools.pairwise(pieces), strict=True
-    ):
-        before: Set[PieceName] = left.keys()
-        after: Set[PieceName] = right.keys()
-        if after == before:
-            continue
-        good, bad = low, high
-        for _ in range(EQUILIBRIUM_REFINEMENTS):
-            inside = np.linspace(good, bad, SECTIONS + 1)[1:-1]
-            there = rest_pieces(loop, parameter, inside)
-            same = next((i for i, piece in enumerate(there) if piece.keys() != before), inside.size)
-            good, bad = [good, *inside.tolist(), bad][same : same + 2]
-        if changes and bad - changes[-1][0] <= ONE_CHANGE * abs(bad):
-            bad, before, _ = changes.pop()
-        changes.append((bad, before, after))
+    there = np.array([~np.isnan(ranges[:, 0]) for ranges in pieces.values()])
+    changes: list[tuple[float, frozenset[PieceName], frozenset[PieceName]]] = []
+    for index in np.flatnonzero(np.any(there[:, 1:] != there[:, :-1], axis=0)).tolist():
+        before, last = present(pieces, index), present(pieces, index + 1)
+        low, high = grid[index : index + 2].tolist()
+        while before != last:
+            change = change_between(loop, parameter, low, high)
+            low = change + ONE_CHANGE * change
+            after = last if low >= high else present(rest_pieces(loop, parameter, np.array([low])), 0)
+            if changes and change - changes[-1][0] <= ONE_CHANGE * change:
+                change, before, _ = changes.pop()
+            if before != after:
+                changes.append((change, before, after))
+            before = after
     for value, first, last in changes:
         gone = ", ".join(sorted(name for name, _ in first - last)) or "none"
         new = ", ".join(sorted(name for name, _ in last - first)) or "none"

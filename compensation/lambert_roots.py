@@ -27,17 +27,21 @@ def resting_ranges(
     there is none.
     """
     for i in range(slope.size):
-        out[i, 0], out[i, 1] = 0.0, 0.0
-        end = (fading[i] - onset[i]) / slope[i]
-        if end <= 0.0:
-            continue
-        inner, outer = 0.0, end
-        if fading[i] > 0.0:
-            inner, outer = lambert_roots(slope[i], onset[i], fading[i], width, end)
-        elif onset[i] >= 0.0:
-            outer = 0.0
-        if outer > inner:
-            out[i, 0], out[i, 1] = inner, outer
+        out[i, 0], out[i, 1] = resting_range(slope[i], onset[i], fading[i], width)
+
+
+@compiled
+def resting_range(slope: float, onset: float, fading: float, width: float) -> tuple[float, float]:
+    """As `resting_ranges`, for one balance."""
+    end = (fading - onset) / slope
+    if end <= 0.0:
+        return 0.0, 0.0
+    inner, outer = 0.0, end
+    if fading > 0.0:
+        inner, outer = lambert_roots(slope, onset, fading, width, end)
+    elif onset >= 0.0:
+        outer = 0.0
+    return (inner, outer) if outer > inner else (0.0, 0.0)
 
 
 @compiled

@@ -13,12 +13,12 @@ from typing import Final
 import numpy as np
 
 from compensation.closed_loop import ClosedLoop
-from compensation.loop_returns import carry_for
-from compensation.loop_runs import run_for
-from compensation.loop_section import PATIENCE, TOLERANCE, LoopSection, with_gain
-from compensation.loop_sweep import COLUMNS, FOUND, HIGH, LOW, PERIOD, SLOPE, UNDECIDED, sweep
+from compensation.loop_returns import map_kernels
+from compensation.loop_section import PATIENCE, TOLERANCE, LoopSection
+from compensation.loop_settling import settled
+from compensation.loop_sweep import COLUMNS, FOUND, HALF_PERIOD, SLOPE, UNDECIDED, sweep
 from compensation.loop_tables import Parameter, tables_over
-from compensation.orbits.periodic_orbits import Cycle, NoCycle, find_cycle
+from compensation.orbits.periodic_orbits import Cycle, NoCycle
 from ident.simulation.filippov_system import FloatArray
 
 STARTS: Final = (0.6, -0.6, 0.1, -0.1)  # x1(0) [rad] from which cycles are looked for
@@ -37,17 +37,13 @@ def stable_cycles(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> l
     for index in range(grid.size - 2, -1, -1):
         for cycle in found[index + 1]:
             if len(found[index]) < len(found[index + 1]):
-                _add(found[index], cycle_near(loop, parameter, float(grid[index]), cycle), first)
+                _add(found[index], cycle_near(loop, parameter, float(grid[index]), cycle), _same(first))
     return found
 
 
 def cycle_near(loop: ClosedLoop, parameter: Parameter, value: float, cycle: Cycle) -> Cycle | NoCycle:
     """The cycle at a value of the gain to which another value's cycle leads."""
-    section = LoopSection(with_gain(loop, parameter, value))
-    if section.symmetric and section.by_series and cycle.returns == 1:
-        (found,) = _swept(loop, parameter, np.array([value]), cycle.point)
-        return found[0] if found else NoCycle("leads to no stable cycle")
-    return find_cycle(section, cycle.point)
+    return settled(loop, parameter, value, cycle.point)
 
 
 def distance(one: Cycle, other: Cycle) -> float:
@@ -60,72 +56,76 @@ def distance(one: Cycle, other: Cycle) -> float:
 def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, cold: FloatArray) -> list[list[Cycle]]:
     """Of a symmetric loop: at most one cycle a value, from the one before or else from `cold` (2,)."""
     tables = tables_over(loop.robot, loop.controller, parameter, grid)
-    run, carried = run_for(tables[0]), carry_for(tables[0])
+    same = _same(LoopSection(loop))
     found: list[list[Cycle]] = []
     while len(found) < grid.size:
-        here = len(found)
-        rows = np.empty((grid.size - here, COLUMNS))
-        verdicts = np.empty(grid.size - here, np.int64)
-        start = found[-1][0].point if found and found[-1] else cold
-        sweep(run, carried, tables[here:], True, TOLERANCE, PATIENCE, start, cold, rows, verdicts)
-        undecided = np.flatnonzero(verdicts == UNDECIDED)
-        done = int(undecided[0]) if undecided.size else verdicts.size
-        cycles = iter(_cycles(rows[:done][verdicts[:done] == FOUND]))
-        found.extend(
-            [cycle] if verdict == FOUND and (cycle := next(cycles)).stable else []
-            for verdict in verdicts[:done].tolist()
-        )
+        if not (found and found[-1] and found[-1][0].returns > 1):
+            here = len(found)
+            found.extend(_decided(grid[here:], tables[here:], _start(found, cold), cold))
         if len(found) < grid.size:
             known: list[Cycle] = []
-            point = found[-1][0].point if found and found[-1] else cold
-            section = LoopSection(with_gain(loop, parameter, float(grid[len(found)])))
-            _add(known, find_cycle(section, point), section)
+            _add(known, settled(loop, parameter, float(grid[len(found)]), _start(found, cold)), same)
             found.append(known)
     return found
 
 
+def _start(found: list[list[Cycle]], cold: FloatArray) -> FloatArray:
+    return found[-1][0].point if found and found[-1] else cold
+
+
+def _decided(
+    values: FloatArray, tables: FloatArray, start: FloatArray, cold: FloatArray
+) -> list[list[Cycle]]:
+    """The cycles at as many of the values (n,) as the kernel decides upon."""
+    rows, verdicts = np.empty((values.size, COLUMNS)), np.empty(values.size, np.int64)
+    sweep(map_kernels(tables[0]), values, tables, TOLERANCE, PATIENCE, start, cold, rows, verdicts)
+    undecided = np.flatnonzero(verdicts == UNDECIDED)
+    done = int(undecided[0]) if undecided.size else verdicts.size
+    cycles = iter(_cycles(rows[:done][verdicts[:done] == FOUND]))
+    return [
+        [cycle] if verdict == FOUND and (cycle := next(cycles)).stable else []
+        for verdict in verdicts[:done].tolist()
+    ]
+
+
 def _cycles(rows: FloatArray) -> list[Cycle]:
-    """Rows of the kernel as symmetric cycles: their period is two returns."""
+    """Rows of the kernel as symmetric cycles: two returns make a period, and x1 is largest at its ends."""
     slopes = rows[:, SLOPE:].reshape(-1, 2, 2)
     multipliers = np.linalg.eigvals(slopes @ slopes).astype(np.complex128)
     order = np.argsort(-np.abs(multipliers), axis=1)
     multipliers = np.take_along_axis(multipliers, order, axis=1)
-    cycles = []
-    for row, largest_first, point in zip(rows.tolist(), multipliers.tolist(), rows[:, :2], strict=True):
-        amplitude = max(row[HIGH], -row[LOW])
-        cycles.append(
-            Cycle(
-                point=point,
-                returns=1,
-                period=2.0 * row[PERIOD],
-                x1_min=-amplitude,
-                x1_max=amplitude,
-                multipliers=tuple(largest_first),
-                stable=abs(largest_first[0]) < 1.0,
-            )
+    stable = np.abs(multipliers[:, 0]) < 1.0
+    amplitudes = np.abs(rows[:, 0])
+    columns = (amplitudes, 2.0 * rows[:, HALF_PERIOD], multipliers, stable)
+    return [
+        Cycle(point, 1, period, -amplitude, amplitude, tuple(largest_first), stable=is_stable)
+        for point, amplitude, period, largest_first, is_stable in zip(
+            rows[:, :2], *(column.tolist() for column in columns), strict=True
         )
-    return cycles
+    ]
 
 
 def _searched(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> list[list[Cycle]]:
+    section = LoopSection(loop)
+    symmetric, same = section.symmetric, _same(section)
+    cold = [np.array([x1, 0.0]) for x1 in (STARTS[:1] if symmetric else STARTS)]
     found: list[list[Cycle]] = []
     for value in grid.tolist():
-        section = LoopSection(with_gain(loop, parameter, value))
-        known: list[Cycle] = []
         warm = [cycle.point for cycle in found[-1]] if found else []
-        cold = STARTS[:1] if section.symmetric else STARTS
-        for point in warm:
-            _add(known, find_cycle(section, point), section)
-        if not (section.symmetric and warm):
-            for x1 in cold:
-                _add(known, find_cycle(section, np.array([x1, 0.0])), section)
+        known: list[Cycle] = []
+        for point in warm if symmetric and warm else [*warm, *cold]:
+            _add(known, settled(loop, parameter, value, point), same)
         found.append(known)
     return found
 
 
-def _add(known: list[Cycle], candidate: Cycle | NoCycle, section: LoopSection) -> None:
+def _same(section: LoopSection) -> float:
+    """Relative difference of two cycles that are one."""
+    return max(SAME_CYCLE, SAME_POINTS * section.accuracy)
+
+
+def _add(known: list[Cycle], candidate: Cycle | NoCycle, same: float) -> None:
     if not isinstance(candidate, Cycle) or not candidate.stable or not math.isfinite(candidate.period):
         return
-    same = max(SAME_CYCLE, SAME_POINTS * section.accuracy)
     if all(distance(candidate, cycle) > same for cycle in known):
         known.append(candidate)

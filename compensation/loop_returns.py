@@ -13,14 +13,14 @@ matrices are well defined, but differences of neighbouring trajectories lose man
 from __future__ import annotations
 
 from functools import cache
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
-from numba import float64, int64, types
+from numba import boolean, float64, int64, types
 
 from compensation.loop_modes import MOTION, SURFACE_ROWS, SYSTEM
-from compensation.loop_runs import begin, is_analytic, run_at
-from compensation.loop_tangents import DEVIATIONS, STATES, TANGENTS, stick_deviations
+from compensation.loop_runs import begin, is_analytic, run_at, run_for
+from compensation.loop_tangents import DEVIATIONS, ROW1, ROW2, ROW3, STATES, TANGENTS, stick_deviations
 from compensation.orbits.saltation import carry, project_along, saltate
 from ident.simulation.compiled import address_of, calls, compiled, owning
 from ident.simulation.dormand_prince import DORMAND_PRINCE
@@ -37,6 +37,23 @@ CARRY: Final = types.void(
     float64[:, ::1], int64[::1], float64[::1], float64, float64, float64[:, ::1], float64[:, ::1]
 )
 carry_at: Final = calls(CARRY)  # carry_at(address, arguments of `carry_by_series`)
+RETURNS: Final = types.UniTuple(int64, 2)(  # type: ignore[no-untyped-call]  # numba
+    int64, float64[:, ::1], boolean, float64, float64, float64[::1], float64[:, ::1]
+)
+returns_at: Final = calls(RETURNS)  # returns_at(address, arguments of `returns`)
+DERIVATIVE: Final = types.Tuple((float64, int64))(  # type: ignore[no-untyped-call]  # numba
+    int64, int64, float64[:, ::1], float64, float64, float64, float64[::1], float64[:, ::1]
+)
+derivative_at: Final = calls(DERIVATIVE)  # derivative_at(address, arguments of `derivative`)
+
+
+class MapKernels(NamedTuple):
+    """Addresses of what follows a loop's return map: searches for cycles need not be compiled with it."""
+
+    run: int
+    carried: int
+    returns: int
+    derivative: int
 
 
 @compiled
@@ -75,6 +92,16 @@ def carry_for(parameters: FloatArray) -> int:
 @cache
 def _carry_address(analytic: bool) -> int:
     return address_of(carry_by_series if analytic else carry_by_dormand_prince, CARRY)
+
+
+def map_kernels(parameters: FloatArray) -> MapKernels:
+    """The kernels for a loop with these parameters (6, 16)."""
+    return MapKernels(run_for(parameters), carry_for(parameters), *_map_addresses())
+
+
+@cache
+def _map_addresses() -> tuple[int, int]:
+    return address_of(returns, RETURNS), address_of(derivative, DERIVATIVE)
 
 
 @owning
@@ -143,16 +170,21 @@ def derivative(
     state: FloatArray,
     out: FloatArray,
 ) -> tuple[float, int]:
-    """Derivative (2, 2) of the half turn from the halt `state` (3,), which moves to the next halt.
+    """Derivative (3, 2) of the half turn from the halt `state` (3,), which moves to the next halt.
 
-    Returns its duration [s] and why it ended. `tangent_tolerance` is that of the deviations' steps; `run` and
-    `carried` are the addresses of the kernels that integrate and that carry deviations.
+    Its rows are those of x1, x2 and the duration [s], by x1 and x2. Returns the duration and why it ended.
+    `tangent_tolerance` is that of the deviations' steps; `run` and `carried` are the addresses of the kernels
+    that integrate and that carry deviations.
     """
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     begin(parameters, state, signs, contact)
     y = np.zeros(STATES * (1 + DEVIATIONS))
     assign(y, state)
-    y[3], y[7], y[8] = 1.0, 1.0, -1.0  # deviations within the section: by x1, and by x2 = -x3
+    y[ROW1], y[ROW2 + 1], y[ROW3 + 1] = (
+        1.0,
+        1.0,
+        -1.0,
+    )  # deviations within the section: by x1, and by x2 = -x3
     mode = np.empty(2, np.int64)
     assign(mode, signs)
     times, which = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64)
@@ -168,7 +200,7 @@ def derivative(
         return end.time, end.reason
     polynomials = np.empty((y.size, ORDER + 1))
     work = np.empty((WORK_ROWS, ORDER + 1))
-    deviations = y[STATES:].reshape(DEVIATIONS, STATES)
+    deviations = y[STATES:].reshape(STATES, DEVIATIONS)
     before, after = np.empty(STATES), np.empty(STATES)
     now = 0.0
     for event in range(end.events):
@@ -181,15 +213,23 @@ def derivative(
         normal = SURFACE_ROWS[which[event], :STATES]
         _rate(parameters, mode, states[event], before)
         if event == end.events - 1:
-            project_along(deviations, before, normal)
+            project_along(deviations, before, normal, out[2])
         elif mode[MOTION] != 0 or which[event] != MOTION:
             _rate(parameters, modes[event], states[event], after)
             saltate(deviations, before, after, normal)
         assign(mode, modes[event])
         now = times[event]
     for i in range(DEVIATIONS):
-        out[0, i], out[1, i] = deviations[i, 0], deviations[i, 1]
+        out[0, i], out[1, i] = deviations[0, i], deviations[1, i]
     return end.time, SECTION
+
+
+@compiled
+def newton_change(slope: FloatArray, missing1: float, missing2: float) -> tuple[float, float]:
+    """Newton's change of a point (2,) that its return misses, towards the fixed point: (1 - slope) change."""
+    a, b, c, d = 1.0 - slope[0, 0], -slope[0, 1], -slope[1, 0], 1.0 - slope[1, 1]
+    determinant = a * d - b * c
+    return (d * missing1 - b * missing2) / determinant, (a * missing2 - c * missing1) / determinant
 
 
 @owning

@@ -17,12 +17,13 @@ from compensation.orbits.periodic_orbits import Returns
 from ident.model.friction import StribeckFriction
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
-from ident.simulation.integrate import END_REASONS, SECTION
+from ident.simulation.integrate import END_REASONS, EQUILIBRIUM, SECTION
 
 TOLERANCE: Final = 1e-13  # of a step; series lose nothing by it
 TOLERANCE_ELSE: Final = 1e-11  # of a Dormand-Prince step
 REPEATS: Final = 1e-11  # relative distance of points that are the same
 GAIN_NAMES: Final = {"r": "compensation", "L": "observer", "n1": "proportional", "n2": "derivative"}
+STILL: Final = 1e-8  # of x1, by which a link still moves that closes in on the edge of an equilibrium set
 PATIENCE: Final = 200.0  # [s] for one half turn
 
 
@@ -47,7 +48,8 @@ class LoopSection:
         return is_analytic(self._parameters)
 
     @property
-    def _tolerance(self) -> float:
+    def tolerance(self) -> float:
+        """Of a step, relative to the largest state."""
         return TOLERANCE if self.by_series else TOLERANCE_ELSE
 
     @property
@@ -57,8 +59,12 @@ class LoopSection:
         Where a law falls as the power beta < 1 of the speed, an error e of x2 near zero is one of e^beta
         in the friction.
         """
-        beta = smallest_shape(self._parameters)
-        return REPEATS if beta >= 1.0 else TOLERANCE_ELSE**beta
+        return REPEATS if self.lipschitz else TOLERANCE_ELSE ** smallest_shape(self._parameters)
+
+    @property
+    def lipschitz(self) -> bool:
+        """Whether no law falls infinitely steeply from rest: all shapes are 1 or more."""
+        return smallest_shape(self._parameters) >= 1.0
 
     def follow(self, point: FloatArray, returns: int) -> Returns:
         """The next returns after a point (2,) of the section."""
@@ -69,20 +75,21 @@ class LoopSection:
         rows = np.empty((count, 5))
         parameters = self._parameters
         made, reason = returns(
-            run_for(parameters), parameters, self.symmetric, self._tolerance, PATIENCE, state, rows
+            run_for(parameters), parameters, self.symmetric, self.tolerance, PATIENCE, state, rows
         )
+        still = rows[:made, 4] - rows[:made, 3] <= STILL * np.abs(rows[:made, 0])
+        if still.any():
+            made, reason = int(np.argmax(still)), EQUILIBRIUM
         rows = rows[:made]
         return Returns(rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], END_REASONS[reason])
 
     def derivative(self, point: FloatArray) -> FloatArray | None:
-        """Derivative (2, 2) of one return from a point (2,).
+        """Derivative (2, 2) of one return from a point (2,), None where it grazes a surface.
 
-        By deviations carried along, or by differences where a law is not Lipschitz (beta < 1): there the
-        coefficients of the deviations' equation are unbounded near x2 = 0.
+        By deviations carried along, or by differences where a law is not Lipschitz: there the coefficients of
+        the deviations' equation are unbounded near x2 = 0.
         """
-        return (
-            self._carried(point) if smallest_shape(self._parameters) >= 1.0 else self._by_differences(point)
-        )
+        return self._carried(point) if self.lipschitz else self._by_differences(point)
 
     def _by_differences(self, point: FloatArray) -> FloatArray | None:
         by = math.sqrt(self.accuracy) * float(np.max(np.abs(point)))
@@ -95,14 +102,14 @@ class LoopSection:
         state = _state(point)
         slope = np.eye(2)
         run, carried = run_for(self._parameters), carry_for(self._parameters)
-        accuracy = (self._tolerance, self._tolerance, PATIENCE)
+        accuracy = (self.tolerance, self.tolerance, PATIENCE)
         for _ in range(MOST_HALTS):
             before = state[0]
-            once = np.empty((2, 2))
+            once = np.empty((3, 2))
             _, reason = derivative(run, carried, self._parameters, *accuracy, state, once)
-            if reason != SECTION:
+            if reason != SECTION or not np.all(np.isfinite(once)):
                 return None
-            slope = once @ slope
+            slope = once[:2] @ slope
             if self.symmetric:
                 return -slope
             if state[0] > before:

@@ -45,11 +45,16 @@ def tables_over(
 
 def tables_over_gains(robot: OneLinkRobot, controller: Controller, gains: FloatArray) -> FloatArray:
     """Tables (n, 6, 16) over rows of `gains` (n, 4): n1 [N m/rad], n2 [N m s/rad], L [1/s], r [-]."""
-    laws = np.array([*_rows(robot.friction), *_rows(controller.model.friction)])
-    inertia = np.array([robot.inertia, controller.model.inertia])
+    laws, inertia = laws_of(robot, controller)
     tables = np.zeros((gains.shape[0], ROWS, COLUMNS))
     _fill(laws, inertia, np.ascontiguousarray(gains, dtype=np.float64), tables)
     return tables
+
+
+def laws_of(robot: OneLinkRobot, controller: Controller) -> tuple[FloatArray, FloatArray]:
+    """Laws (4, 5) and inertias (2,) of robot and model, as `loop_parameters.mode_table` takes them."""
+    laws = np.array([*_rows(robot.friction), *_rows(controller.model.friction)])
+    return laws, np.array([robot.inertia, controller.model.inertia])
 
 
 @compiled

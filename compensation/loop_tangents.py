@@ -1,8 +1,10 @@
 """Deviations from a trajectory of the closed loop: its modes linearised, as kernels.
 
-The nine states are (x1, x2, x3) and two deviations from it, which span a section of the state space.
-Their Taylor recurrences are the derivatives of those in `loop_modes`, their fields its Jacobian times
-the deviation.
+The nine states are (x1, x2, x3) and two deviations from it, which span a section of the state space, as
+the columns of a matrix (3, 2): its rows follow the state. Their fields are the Jacobian of `loop_modes` times
+the deviation: with its symbols, a deviation d of the state changes E by -(s2/v_s^) E d2 and exp(-|v|/v_s)
+by -(sv/v_s) exp(-|v|/v_s) (d2 + d3). So its Taylor recurrence needs the series of the state and two
+convolutions. Packs hold both deviations.
 """
 
 from __future__ import annotations
@@ -10,7 +12,7 @@ from __future__ import annotations
 from math import exp, expm1
 from typing import Any, Final
 
-from compensation.bell_series import BELL, rate_of, rates_of
+from compensation.bell_series import BELL, rate_of
 from compensation.loop_modes import field, mode_series
 from compensation.loop_parameters import (
     A1,
@@ -39,6 +41,7 @@ from ident.simulation.packs import fused, number_of, pack_at, packed, place_pack
 
 STATES: Final = 3
 DEVIATIONS: Final = 2
+ROW1, ROW2, ROW3 = STATES, STATES + DEVIATIONS, STATES + 2 * DEVIATIONS  # of the deviations of x1, x2, x3
 
 
 @compiled
@@ -63,12 +66,12 @@ def tangent_field(signs: Signs, state: FloatArray, parameters: FloatArray, out: 
     _, slopev = _faded(k[SIGNV] * (state[1] + state[2]), k[WIDTHV], k[SHAPEV])
     by_estimate, by_velocity = k[SIGN2] * slope2, k[SIGNV] * slopev
     factor = k[K2] - k[KV] if k[ALIKE] != 0.0 else k[K2]
-    for d in range(1, 1 + DEVIATIONS):
-        i = STATES * d
-        e1, e2, e3 = state[i], state[i + 1], state[i + 2]
-        out[i] = e2 + e3
-        out[i + 1] = k[C1] * e1 + k[C2] * e2 + k[GAIN] * e3
-        out[i + 2] = (
+    for d in range(DEVIATIONS):
+        one, two, three = ROW1 + d, ROW2 + d, ROW3 + d
+        e1, e2, e3 = state[one], state[two], state[three]
+        out[one] = e2 + e3
+        out[two] = k[C1] * e1 + k[C2] * e2 + k[GAIN] * e3
+        out[three] = (
             k[A1] * e1 + k[A2] * e2 + k[A3] * e3 + factor * by_estimate * e2 + k[KV] * by_velocity * (e2 + e3)
         )
 
@@ -85,66 +88,83 @@ def tangent_series(
     """Taylor coefficients of the state and of two deviations into rows 0..8, shapes 1 or 2."""
     reach = mode_series(signs, state[:STATES], parameters, order, coefficients, work)
     mode = slip_row(signs)
-    a1, a2, a3 = parameters[mode, A1], parameters[mode, A2], parameters[mode, A3]
-    c1, c2, gain = parameters[mode, C1], parameters[mode, C2], parameters[mode, GAIN]
-    k2, kv, shared = parameters[mode, K2], parameters[mode, KV], parameters[mode, ALIKE]
     bell2, bellv = parameters[mode, SHAPE2] == BELL, parameters[mode, SHAPEV] == BELL
     rate2 = rate_of(parameters[mode, SIGN2], parameters[mode, WIDTH2], bell2)
     ratev = rate_of(parameters[mode, SIGNV], parameters[mode, WIDTHV], bellv)
-    faded = fadings(order)
-    factors, slopes = 2 * faded, 3 * faded
-    start = pack_at(4, work, faded)
-    here2, here3 = state[1], state[2]
-    for d in range(1, 1 + DEVIATIONS):
-        s = STATES * d
-        own = 4 * faded * d  # where the deviation's share of `work` begins, in the order of the state's
-        x1, x2, x3 = state[s], state[s + 1], state[s + 2]
-        coefficients[s, 0], coefficients[s + 1, 0], coefficients[s + 2, 0] = x1, x2, x3
-        begun2, begunv, apart = x2, x2 + x3, x3
-        if bell2:
-            begun2 = here2 * x2
-        if bellv:
-            begunv, apart = (here2 + here3) * (x2 + x3), here3 * x2 + (here2 + here3) * x3
-        e = rate2 * number_of(start, 0) * begun2
-        w = ratev * (number_of(start, 1) * begunv + number_of(start, 2) * apart)
-        for i in range(order):
-            two = c1 * x1 + c2 * x2 + gain * x3
-            three = a1 * x1 + a2 * x2 + a3 * x3 + k2 * e + kv * w
-            place_pack(work, own + faded + 4 * i, packed(e, w, shared * e, 0.0))
-            product = spread(4, 0.0)
-            if bell2 or bellv:
-                place_pack(work, own + factors + 4 * i, packed(x2, x2 + x3, x2 + x3, x3))
-                place_pack(work, own + slopes + 4 * i, packed(two, two + three, three, two))
-                product = _crossed(work, own, factors, slopes, i)
-            place_pack(work, own + 4 * i, rates_of(product, two, three, bell2, bellv))
-            total = _crossed(work, own, 0, faded, i)
-            step = 1.0 / (i + 1)
-            x1, x2, x3 = (x2 + x3) * step, two * step, three * step
-            coefficients[s, i + 1], coefficients[s + 1, i + 1], coefficients[s + 2, i + 1] = x1, x2, x3
-            e = rate2 * step * number_of(total, 0)
-            w = ratev * step * (number_of(total, 1) + number_of(total, 2))
+    by2 = (parameters[mode, K2] - parameters[mode, ALIKE] * parameters[mode, KV]) * rate2
+    weights = 4 * fadings(order)
+    _weigh(order, by2, parameters[mode, KV] * ratev, bell2, bellv, work, weights)
+    now = pack_at(4, work, weights)
+    now2, nowv = number_of(now, 0), number_of(now, 2)
+    a1, a2 = spread(2, parameters[mode, A1]), spread(2, parameters[mode, A2] + now2 + nowv)
+    a3, gain = spread(2, parameters[mode, A3] + nowv), spread(2, parameters[mode, GAIN])
+    c1, c2 = spread(2, parameters[mode, C1]), spread(2, parameters[mode, C2])
+    x1, x2, x3 = pack_at(2, state, ROW1), pack_at(2, state, ROW2), pack_at(2, state, ROW3)
+    _keep(coefficients, 0, x1, x2, x3)
+    own = weights + fadings(order)
+    for i in range(order):
+        by_estimate, by_velocity = spread(2, 0.0), spread(2, 0.0)
+        for j in range(i):
+            at, back = own + 4 * j, weights + 4 * (i - j)
+            by_estimate = fused(pack_at(2, work, at), pack_at(2, work, back), by_estimate)
+            by_velocity = fused(pack_at(2, work, at + 2), pack_at(2, work, back + 2), by_velocity)
+        v = x2 + x3
+        place_pack(work, own + 4 * i, x2)
+        place_pack(work, own + 4 * i + 2, v)
+        two = fused(gain, x3, fused(c2, x2, c1 * x1))
+        three = fused(a2, x2, fused(a3, x3, fused(a1, x1, by_estimate + by_velocity)))
+        step = spread(2, 1.0 / (i + 1))
+        x1, x2, x3 = v * step, two * step, three * step
+        _keep(coefficients, i + 1, x1, x2, x3)
     return reach
 
 
 @specialised
-def _crossed(work: FloatArray, own: int, first: int, second: int, i: int) -> Any:
-    """Coefficient i of the deviation of a product: each factor's deviation with the other factor."""
-    one, other = spread(4, 0.0), spread(4, 0.0)
-    for j in range(i + 1):
-        at, back = 4 * j, 4 * (i - j)
-        one = fused(pack_at(4, work, own + first + at), pack_at(4, work, second + back), one)
-        other = fused(pack_at(4, work, first + at), pack_at(4, work, own + second + back), other)
-    return one + other
+def _keep(coefficients: FloatArray, order: int, x1: Any, x2: Any, x3: Any) -> None:
+    coefficients[ROW1, order], coefficients[ROW1 + 1, order] = number_of(x1, 0), number_of(x1, 1)
+    coefficients[ROW2, order], coefficients[ROW2 + 1, order] = number_of(x2, 0), number_of(x2, 1)
+    coefficients[ROW3, order], coefficients[ROW3 + 1, order] = number_of(x3, 0), number_of(x3, 1)
+
+
+@specialised
+def _weigh(
+    order: int, by2: float, byv: float, bell2: bool, bellv: bool, work: FloatArray, weights: int
+) -> None:
+    """The series by which deviations of x2 and of v accelerate, twice each, into `work` from `weights` on.
+
+    They are `by2` E and `byv` exp(-|v|/v_s) where the shape is 1, of a bell `by2` x2 E and `byv` v
+    exp(-(v/v_s)^2).
+    """
+    faded = fadings(order)
+    factors, alone = 2 * faded, weights + faded
+    for i in range(order):
+        here = pack_at(4, work, faded + 4 * i)
+        e, w = by2 * number_of(here, 0), byv * (number_of(here, 1) + number_of(here, 2))
+        place_pack(work, weights + 4 * i, packed(e, e, w, w))
+        if bell2 or bellv:
+            place_pack(work, alone + 4 * i, packed(e, e, w, w))
+    if not (bell2 or bellv):
+        return
+    for i in range(order):
+        total = spread(4, 0.0)
+        for j in range(i + 1):
+            factor = pack_at(4, work, factors + 4 * j)
+            x2, v = number_of(factor, 0), number_of(factor, 1)
+            total = fused(packed(x2, x2, v, v), pack_at(4, work, alone + 4 * (i - j)), total)
+        own = pack_at(4, work, alone + 4 * i)
+        e = number_of(total, 0) if bell2 else number_of(own, 0)
+        w = number_of(total, 2) if bellv else number_of(own, 2)
+        place_pack(work, weights + 4 * i, packed(e, e, w, w))
 
 
 @compiled
 def stick_deviations(deviations: FloatArray, sign: int, parameters: FloatArray, duration: float) -> None:
-    """Carry deviations (2, 3) of a sticking state, in place: x1 stays, x2 forgets its start."""
+    """Carry deviations (3, 2) of a sticking state, in place: x1 stays, x2 forgets its start."""
     k = parameters[4 + (1 if sign > 0 else 0)]
     forgotten = -expm1(-k[RATE] * duration)
-    for i in range(deviations.shape[0]):
-        deviations[i, 1] += (k[GOAL] * deviations[i, 0] - deviations[i, 1]) * forgotten
-        deviations[i, 2] = -deviations[i, 1]
+    for i in range(DEVIATIONS):
+        deviations[1, i] += (k[GOAL] * deviations[0, i] - deviations[1, i]) * forgotten
+        deviations[2, i] = -deviations[1, i]
 
 
 TANGENTS: Final = FilippovSystem(

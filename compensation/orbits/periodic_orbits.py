@@ -30,6 +30,7 @@ NEWTON_STEPS: Final = 12
 SAME_POINT: Final = 1e-7  # relative distance of points of a converged cycle that are one
 VANISHED: Final = 1e-9  # of the start: what has become as small decays
 NEAR: Final = 1e-3  # relative distance from which shooting is tried
+NO_DERIVATIVE: Final = "the return has no derivative that leads on"
 
 
 @dataclass(frozen=True)
@@ -115,9 +116,11 @@ def shoot(section: ReturnMap, guess: FloatArray, returns: int) -> Cycle | NoCycl
     for _ in range(NEWTON_STEPS):
         done = section.follow(point, returns)
         slope = slope_of(section, point, returns)
-        if done.end_reason != "section reached" or slope is None:
+        if done.end_reason != "section reached":
             return NoCycle(done.end_reason)
-        change = np.linalg.solve(np.eye(point.size) - slope, done.points[-1] - point)
+        change = None if slope is None else _newton_step(slope, done.points[-1] - point)
+        if change is None:
+            return NoCycle(NO_DERIVATIVE)
         point = point + change
         if float(np.max(np.abs(change))) <= section.accuracy * float(np.max(np.abs(point))):
             return cycle_at(section, point, returns)
@@ -131,30 +134,55 @@ def cycle_at(section: ReturnMap, point: FloatArray, returns: int) -> Cycle | NoC
     fewer = _repeats(np.concatenate([done.points[-1:], done.points]), same)
     if done.end_reason == "section reached" and 0 < fewer < returns:
         return cycle_at(section, point, fewer)
-    slope = slope_of(section, point, returns)
-    if done.end_reason != "section reached" or slope is None:
+    if done.end_reason != "section reached":
         return NoCycle(done.end_reason)
-    point = point + np.linalg.solve(np.eye(point.size) - slope, done.points[-1] - point)
-    period = float(np.sum(done.durations))
-    low, high = float(np.min(done.lows)), float(np.max(done.highs))
-    if section.symmetric:
-        sides = np.where(np.arange(returns) % 2 == 0, 1.0, -1.0)
-        ends = np.concatenate([sides * done.lows, sides * done.highs])
-        low, high = float(ends.min()), float(ends.max())
-        if returns % 2 == 1:
-            period, slope = 2.0 * period, slope @ slope
-            high = max(high, -low)
-            low = -high
+    slope = slope_of(section, point, returns)
+    change = None if slope is None else _newton_step(slope, done.points[-1] - point)
+    if slope is None or change is None:
+        return NoCycle(NO_DERIVATIVE)
+    point = point + change
+    sides = np.where(np.arange(returns) % 2 == 0, 1.0, -1.0 if section.symmetric else 1.0)
+    ends = np.concatenate([sides * done.lows, sides * done.highs])
+    extremes = (float(ends.min()), float(ends.max()))
+    return cycle_of(point, returns, float(np.sum(done.durations)), extremes, slope, section.symmetric)
+
+
+def cycle_of(
+    point: FloatArray,
+    returns: int,
+    duration: float,
+    extremes: tuple[float, float],
+    slope: FloatArray,
+    symmetric: bool,
+) -> Cycle:
+    """The cycle of a number of returns that take a `duration` [s], from what was found of them.
+
+    `extremes` are those of x1 on the way and `slope` (d, d) is their derivative. In a `symmetric` map an odd
+    number of returns is half a period.
+    """
+    low, high = extremes
+    if symmetric and returns % 2 == 1:
+        duration, slope = 2.0 * duration, slope @ slope
+        high = max(high, -low)
+        low = -high
     multipliers = sorted((complex(value) for value in np.linalg.eigvals(slope)), key=abs, reverse=True)
     return Cycle(
         point=point,
         returns=returns,
-        period=period,
+        period=duration,
         x1_min=low,
         x1_max=high,
         multipliers=tuple(multipliers),
         stable=abs(multipliers[0]) < 1.0,
     )
+
+
+def _newton_step(slope: FloatArray, missing: FloatArray) -> FloatArray | None:
+    """Change (d,) of a point that the return misses by (d,); None where the derivative (d, d) tells none."""
+    try:
+        return np.asarray(np.linalg.solve(np.eye(missing.size) - slope, missing), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return None
 
 
 def _repeats(points: FloatArray, tolerance: float) -> int:

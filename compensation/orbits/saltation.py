@@ -18,35 +18,34 @@ from ident.simulation.filippov_system import FilippovSystem, FloatArray, OneStep
 
 @compiled
 def saltate(deviations: FloatArray, before: FloatArray, after: FloatArray, normal: FloatArray) -> None:
-    """Carry deviations (k, n), in place, across the surface with `normal` (n,) between two fields (n,).
-
-    A field along the surface, of a motion that only touches it, leaves them as they are.
-    """
-    speed = 0.0
-    for j in range(normal.size):
-        speed += normal[j] * before[j]
-    if speed == 0.0:
-        return
-    for i in range(deviations.shape[0]):
-        ahead = 0.0
+    """Carry deviations (n, k), in place, across the surface with `normal` (n,) between two fields (n,)."""
+    for i in range(deviations.shape[1]):
+        early = _early(deviations, i, before, normal)
         for j in range(normal.size):
-            ahead += normal[j] * deviations[i, j]
-        for j in range(normal.size):
-            deviations[i, j] += (after[j] - before[j]) * (ahead / speed)
+            deviations[j, i] += (after[j] - before[j]) * early
 
 
 @compiled
-def project_along(deviations: FloatArray, field: FloatArray, normal: FloatArray) -> None:
-    """Project deviations (k, n), in place, along the field (n,) onto the surface with `normal` (n,)."""
-    speed = 0.0
+def project_along(deviations: FloatArray, field: FloatArray, normal: FloatArray, later: FloatArray) -> None:
+    """Project deviations (n, k), in place, along the field (n,) onto the surface with `normal` (n,).
+
+    How much later they arrive there goes into `later` (k,) [s].
+    """
+    for i in range(deviations.shape[1]):
+        early = _early(deviations, i, field, normal)
+        for j in range(normal.size):
+            deviations[j, i] -= field[j] * early
+        later[i] = -early
+
+
+@compiled
+def _early(deviations: FloatArray, column: int, field: FloatArray, normal: FloatArray) -> float:
+    """How much earlier [s] a deviated trajectory reaches the surface, n d / (n f-)."""
+    ahead, speed = 0.0, 0.0
     for j in range(normal.size):
+        ahead += normal[j] * deviations[j, column]
         speed += normal[j] * field[j]
-    for i in range(deviations.shape[0]):
-        ahead = 0.0
-        for j in range(normal.size):
-            ahead += normal[j] * deviations[i, j]
-        for j in range(normal.size):
-            deviations[i, j] -= field[j] * (ahead / speed)
+    return ahead / speed
 
 
 @specialised

@@ -5,6 +5,7 @@ import pytest
 
 from compensation.bifurcation import Branch, Diagram, chained, diagram, where_it_ends
 from compensation.closed_loop import ClosedLoop
+from compensation.coexistence import largest_compensation_with_rest
 from compensation.controller import Controller, Gains
 from compensation.orbits.periodic_orbits import Cycle
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
@@ -96,6 +97,15 @@ def test_a_grid_value_on_the_change_makes_no_second_change() -> None:
     (change,) = [b for b in drawn.bifurcations if "equilibria" in b.kind]
     assert change.value == pytest.approx(1.0, abs=1e-9)
     assert change.kind.endswith("around the set point ends, set point begins")
+
+
+def test_all_changes_inside_one_interval_are_found() -> None:
+    """Below the critical gain rests beside the set point appear at r = 1 and vanish at r_max(L)."""
+    below = loop(observer=40.0)
+    r_max = largest_compensation_with_rest(below.robot, below.controller).r_max
+    drawn = diagram(below, "r", [0.9, 1.2])
+    changes = [b.value for b in drawn.bifurcations if "equilibria" in b.kind]
+    assert changes == pytest.approx([1.0, r_max], rel=1e-12)
 
 
 def test_cycles_that_coexist_are_chained_each_to_its_nearest() -> None:

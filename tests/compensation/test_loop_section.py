@@ -7,7 +7,10 @@ import pytest
 
 from compensation.closed_loop import ClosedLoop, simulate
 from compensation.controller import Controller, Gains
-from compensation.loop_section import LoopSection, with_gain
+from compensation.loop_returns import carry_for, derivative
+from compensation.loop_runs import run_for
+from compensation.loop_section import PATIENCE, TOLERANCE, LoopSection, with_gain
+from compensation.loop_tables import mode_parameters
 from compensation.orbits.periodic_orbits import Cycle, NoCycle, find_cycle
 from ident.model.friction import StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
@@ -60,6 +63,20 @@ def test_half_map_multipliers_where_they_are_not_zero(r: float, observer: float,
     assert abs(cycle.multipliers[0]) == pytest.approx(largest**2, rel=1e-9)
     by_differences = differences(where, cycle.point, 1e-6 * cycle.amplitude)
     np.testing.assert_allclose(slope, by_differences, rtol=1e-4, atol=2e-9)
+
+
+@pytest.mark.parametrize(("observer", "point"), [(73.5, (0.35, -0.004)), (40.0, (0.25, -0.02))])
+def test_derivative_of_the_duration(observer: float, point: tuple[float, float]) -> None:
+    where = section(1.05, observer)
+    parameters = mode_parameters(where.loop.robot, where.loop.controller)
+    out = np.empty((3, 2))
+    derivative(
+        run_for(parameters), carry_for(parameters), parameters, TOLERANCE, TOLERANCE, PATIENCE,
+        np.array([*point, -point[1]]), out,
+    )  # fmt: skip
+    for i, axis in enumerate(1e-5 * np.eye(2)):
+        later, sooner = (where.follow(np.array(point) + side * axis, 1).durations[0] for side in (1, -1))
+        assert out[2, i] == pytest.approx((later - sooner) / 2e-5, rel=1e-6)
 
 
 def test_derivative_of_a_turn_with_sticking_and_asymmetry() -> None:

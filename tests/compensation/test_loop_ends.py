@@ -1,0 +1,57 @@
+"""Ends of branches of cycles: there is a cycle just inside, and none just outside."""
+
+import numpy as np
+import pytest
+
+from compensation.closed_loop import ClosedLoop
+from compensation.controller import Controller, Gains
+from compensation.loop_ends import FINE, last_cycle
+from compensation.loop_section import LoopSection, with_gain
+from compensation.orbits.periodic_orbits import Cycle, find_cycle
+from ident.model.published import asymmetric_robot, symmetric_robot
+
+GAINS = Gains(proportional=0.4, derivative=0.02, observer=73.5, compensation=1.0)
+
+
+def cycle_at(loop: ClosedLoop, r: float) -> Cycle:
+    cycle = find_cycle(LoopSection(with_gain(loop, "r", r)), np.array([0.6, 0.0]))
+    assert isinstance(cycle, Cycle)
+    return cycle
+
+
+def paper() -> ClosedLoop:
+    return ClosedLoop(symmetric_robot(), Controller(GAINS, symmetric_robot()))
+
+
+@pytest.mark.parametrize("suspects", [[], [1.0], [0.995, 1.0]])
+def test_cycles_shrink_to_nothing_where_the_set_point_loses_its_stability(suspects: list[float]) -> None:
+    """Below 1 + 1.1e-5 the cycle is not symmetric any more, but there is one down to 1."""
+    last = last_cycle(paper(), "r", (1.01, 0.99), cycle_at(paper(), 1.01), suspects)
+    assert 1.0 < last.value <= 1.0 + 0.02 * FINE
+    assert last.cycle.amplitude < 1e-5
+
+
+def test_a_branch_that_ends_with_a_jump() -> None:
+    loop = ClosedLoop(asymmetric_robot(), Controller(GAINS, symmetric_robot()))
+    last = last_cycle(loop, "r", (1.0, 0.99), cycle_at(loop, 1.0), [])
+    assert last.cycle.amplitude > 0.1
+    inside = find_cycle(LoopSection(with_gain(loop, "r", last.value)), last.cycle.point)
+    assert isinstance(inside, Cycle)
+    assert inside.amplitude == pytest.approx(last.cycle.amplitude, rel=1e-7)
+    beyond = find_cycle(LoopSection(with_gain(loop, "r", last.value - 0.01 * FINE)), last.cycle.point)
+    assert not isinstance(beyond, Cycle)
+
+
+def test_a_suspect_that_is_none_does_no_harm() -> None:
+    loop = ClosedLoop(asymmetric_robot(), Controller(GAINS, symmetric_robot()))
+    cycle = cycle_at(loop, 1.0)
+    plain = last_cycle(loop, "r", (1.0, 0.99), cycle, [])
+    for suspect in (0.9905, 0.9999, 1.2):
+        other = last_cycle(loop, "r", (1.0, 0.99), cycle, [suspect])
+        assert other.value == pytest.approx(plain.value, abs=0.02 * FINE)
+
+
+def test_between_neighbouring_numbers_there_is_nothing_to_find() -> None:
+    outside = float(np.nextafter(1.01, 0.0))
+    last = last_cycle(paper(), "r", (1.01, outside), cycle_at(paper(), 1.01), [outside, 1.01])
+    assert last.value == 1.01
