@@ -10,8 +10,8 @@ from __future__ import annotations
 from math import exp, expm1
 from typing import Any, Final
 
-from compensation.bell_series import BELL, rate_of, rates_of
-from compensation.loop_modes import field, mode_series
+from compensation.bell_series import BELL, bell_series, rate_of, rates_of
+from compensation.loop_modes import field
 from compensation.loop_parameters import (
     A1,
     A2,
@@ -83,7 +83,7 @@ def tangent_series(
     work: FloatArray,
 ) -> float:
     """Taylor coefficients of the state and of two deviations into rows 0..8, shapes 1 or 2."""
-    reach = mode_series(signs, state[:STATES], parameters, order, coefficients, work)
+    reach = bell_series(signs, state[:STATES], parameters, order, coefficients, work)
     mode = slip_row(signs)
     a1, a2, a3 = parameters[mode, A1], parameters[mode, A2], parameters[mode, A3]
     c1, c2, gain = parameters[mode, C1], parameters[mode, C2], parameters[mode, GAIN]
