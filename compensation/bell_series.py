@@ -67,7 +67,8 @@ def bell_series(
 ) -> float:
     """As `loop_series.series` for shapes of 1 and 2.
 
-    Behind the fadings `work` keeps the factors of the rates, (x2, v, v, x3) and (x2', v', x3', x2').
+    `work` keeps the rates, 4 numbers an order, from `fadings(order)` on the fadings (E, W, E or 0), and
+    behind them the factors of the rates, (x2, v, v, x3) and (x2', v', x3', x2').
     """
     mode = slip_row(signs)
     a1, a2, a3 = parameters[mode, A1], parameters[mode, A2], parameters[mode, A3]
@@ -109,5 +110,10 @@ def bell_series(
         e = rate2 * step * number_of(total, 0)
         w = ratev * step * (number_of(total, 1) + number_of(total, 2))
     if max(fall2, fallv) > order:
-        return reach_of(work, order, rate2, ratev, fall2, fallv)
+        exponents = 4 * faded
+        for k in range(1, order + 1):
+            rate = pack_at(4, work, 4 * k - 4)
+            exponent2, exponentv = rate2 * number_of(rate, 0) / k, ratev * number_of(rate, 1) / k
+            place_pack(work, exponents + 4 * k, packed(exponent2, exponentv, 0.0, 0.0))
+        return reach_of(work, exponents, order, fall2, fallv)
     return inf

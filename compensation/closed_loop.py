@@ -19,19 +19,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from compensation.controller import Controller
-from compensation.loop_runs import (
-    EVENT_NAMES,
-    begin,
-    is_analytic,
-    name_events,
-    run_dormand_prince,
-    run_series,
-)
+from compensation.loop_runs import EVENT_NAMES, SURFACES, follow, run_for
 from compensation.loop_tables import mode_parameters
 from ident.model.friction import ModelError
 from ident.model.robot import OneLinkRobot
@@ -52,6 +46,11 @@ class ClosedLoop:
 
     robot: OneLinkRobot
     controller: Controller
+
+    @cached_property
+    def modes(self) -> FloatArray:
+        """The numbers of all modes (6, 16) of `loop_parameters`, not to be written to."""
+        return mode_parameters(self.robot, self.controller)
 
 
 def simulate(
@@ -117,37 +116,16 @@ def _run(
     tolerance: float,
 ) -> tuple[Progress, Marks]:
     """Advance `state` to the end, in place; `states` at `times` on the way."""
-    parameters = mode_parameters(loop.robot, loop.controller)
-    run = run_series if is_analytic(parameters) else run_dormand_prince
-    signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
-    begin(parameters, state, signs, contact)
+    run = run_for(loop.modes)
+    mode = np.empty((2, SURFACES), np.int64)
     parts: list[Marks] = []
     time, steps = 0.0, STEP_LIMIT
     while True:
-        first = signs.copy()
-        at, which = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64)
-        modes, where = np.empty((EVENT_STORE, 2), np.int64), np.empty((EVENT_STORE, 3))
-        end: Progress = run(
-            parameters,
-            tolerance,
-            duration,
-            steps,
-            -1,
-            0,
-            0,
-            time,
-            state,
-            signs,
-            contact,
-            times,
-            states,
-            at,
-            which,
-            modes,
-            where,
+        at, kinds, where = np.empty(EVENT_STORE), np.empty(EVENT_STORE, np.int64), np.empty((EVENT_STORE, 3))
+        end: Progress = follow(
+            run, loop.modes, tolerance, duration, steps, time, state, mode, times, states, at, kinds, where
         )
-        name_events(which[: end.events], modes, first)
-        parts.append(Marks(at[: end.events], which[: end.events], where[: end.events], EVENT_NAMES))
+        parts.append(Marks(at[: end.events], kinds[: end.events], where[: end.events], EVENT_NAMES))
         time, steps = end.time, steps - end.steps
         if end.reason != EVENTS_FULL:
             return end, _joined(parts)

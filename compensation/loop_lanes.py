@@ -114,10 +114,11 @@ def lane_series(
         estimate, velocity = states[1, lane], states[1, lane] + states[2, lane]
         fall2, fallv = by_estimate * estimate, by_velocity * velocity
         if max(fall2, fallv) > ORDER:
-            for k in range(ORDER):
-                own = packed(work[0, k, lane], work[2, k, lane], 0.0, 0.0)
-                place_pack(work, SERIES * ROW + 4 * k, own)
-            reach[lane] = reach_of(work[SERIES:], ORDER, -by_estimate, -by_velocity, fall2, fallv)
+            for k in range(1, ORDER + 1):
+                x2, x3 = coefficients[1, k, lane], coefficients[2, k, lane]
+                exponents = packed(by_estimate * x2, by_velocity * (x2 + x3), 0.0, 0.0)
+                place_pack(work, SERIES * ROW + 4 * k, exponents)
+            reach[lane] = reach_of(work, SERIES * ROW, ORDER, fall2, fallv)
 
 
 @specialised

@@ -24,6 +24,7 @@ from ident.simulation.taylor import TAYLOR
 
 SLIP_MODES: Final = 4
 TOUCH: Final = "estimate touch"  # x2 comes to zero but for the tolerance, and keeps its sign
+SURFACES: Final = 2
 PROGRESS: Final = types.NamedTuple((float64, *4 * (int64,)), Progress)  # type: ignore[no-untyped-call]  # numba
 RUN: Final = PROGRESS(
     float64[:, ::1], float64, float64, int64, int64, int64, int64, float64, float64[::1], int64[::1],
@@ -107,6 +108,43 @@ def name_events(surfaces_met: Signs, modes: Signs, first: Signs) -> None:
         else:
             surfaces_met[i] = 4 if modes[i, REVERSAL] == estimate else 3
         moving, estimate = after, modes[i, REVERSAL]
+
+
+@owning
+def follow(
+    run: int,
+    parameters: FloatArray,
+    tolerance: float,
+    end: float,
+    step_limit: int,
+    time: float,
+    state: FloatArray,
+    mode: Signs,
+    times: FloatArray,
+    states: FloatArray,
+    event_times: FloatArray,
+    event_kinds: Signs,
+    event_states: FloatArray,
+) -> Progress:
+    """Begin at time 0, or go on, with the kernel at the address `run`; events are named on the way.
+
+    `mode` (2, 2) keeps signs and contacts between calls, `event_kinds` (e,) are indices of EVENT_NAMES; the
+    other arguments are those of `run_series`.
+    """
+    signs, contact = mode[0], mode[1]
+    if time == 0.0:
+        begin(parameters, state, signs, contact)
+    first = signs.copy()
+    event_signs = np.empty((event_times.size, SURFACES), np.int64)
+    now: Progress = run_at(
+        run,
+        (
+            parameters, tolerance, end, step_limit, -1, 0, 0, time, state, signs, contact,
+            times, states, event_times, event_kinds, event_signs, event_states,
+        ),
+    )  # fmt: skip
+    name_events(event_kinds[: now.events], event_signs, first)
+    return now
 
 
 @owning

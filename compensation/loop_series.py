@@ -5,16 +5,22 @@ like with v'. So each new coefficient of the state gives the next of E and W, an
 (Knuth, The Art of Computer Programming, volume 2, 4.7), at one short convolution each. Where W is the
 difference exp(-|v|/v_s) - E, its equation is W' = -(sv/v_s) (v' W + x3' E), and no digits are lost.
 
-The three convolutions, x2' with E, v' with W and x3' with E, are one of packs (`packs`): rates (x2', v', x3',
-0) with fadings (E, W, E, 0), the third fading 0 where W stands alone. It is summed in two interleaved halves:
-additions wait for each other, and two chains wait half as long. The terms with the newest coefficients come
-last, from registers, so that all others are summed while those are still awaited.
+The three convolutions are one of packs (`packs`): slopes (., x3', x2', x2') with fadings (., W + E, E, W),
+where W + E is W alone if W is no difference. What they cost is waiting, coefficient for coefficient, and so
+nothing waits that need not. With y = (x2, x3, E, W), all terms that contain the two newest coefficients, or
+the two first ones, are linear in those of order i and i - 1,
+
+    (i + 1) y_{i+1} = b1 x1_i + (b2 + i c2) x2_i + (b3 + i c3) x3_i + b_e E_i + b_w W_i
+                      + d_e E_{i-1} + d_w W_{i-1} + convolution of what is older (2..i - 2),
+
+with columns b, c, d that are formed once; the convolution runs from its middle outwards, so that its newest
+terms come last, and is laid out for every order (`unrolled`).
 """
 
 from __future__ import annotations
 
 from math import exp, inf
-from typing import Final
+from typing import Any, Final
 
 from compensation.loop_parameters import (
     A1,
@@ -34,11 +40,26 @@ from compensation.loop_parameters import (
     fading_difference,
     slip_row,
 )
-from ident.simulation.compiled import compiled
+from ident.simulation.compiled import compiled, passed, specialised, unrolled
 from ident.simulation.filippov_system import FloatArray, Signs
-from ident.simulation.packs import fused, number_of, pack_at, packed, place_pack, spread
+from ident.simulation.pack_functions import rough_power_of_two
+from ident.simulation.packs import (
+    fused,
+    larger,
+    magnitude,
+    number_of,
+    pack_at,
+    packed,
+    place_pack,
+    rough_log2,
+    smaller,
+    spread,
+)
+from ident.simulation.taylor import SMALLEST
 
 UNSEEN: Final = 40.0  # exp(-40) is below rounding
+UNLIMITED: Final = 1e300
+LONGEST: Final = 1000.0  # of a reach, as a power of two
 
 
 @compiled
@@ -50,9 +71,9 @@ def series(
     coefficients: FloatArray,
     work: FloatArray,
 ) -> float:
-    """Taylor coefficients of the state into rows 0..2 of `coefficients`.
+    """Taylor coefficients of the state into rows 0..2 of `coefficients`; `order` is a literal.
 
-    `work` keeps those of the rates, 4 numbers each, and from `fadings(order)` on those of the fadings.
+    `work` keeps those of the slopes, 4 numbers each, and from `fadings(order)` on those of the fadings.
     Returns for how long the series hold: at many times v_s, E is lost in rounding, yet is back before v is
     small.
     """
@@ -62,46 +83,79 @@ def series(
     k2, kv, shared = parameters[mode, K2], parameters[mode, KV], parameters[mode, ALIKE]
     rate2 = -parameters[mode, SIGN2] / parameters[mode, WIDTH2]
     ratev = -parameters[mode, SIGNV] / parameters[mode, WIDTHV]
-    faded = fadings(order)
     x1, x2, x3 = state[0], state[1], state[2]
     fall2, fallv = -(rate2 * x2), -(ratev * (x2 + x3))
     e = exp(-fall2)
     w = fading_difference(e, fallv, ratev * x3) if shared != 0.0 else exp(-fallv)
-    e0, w0, w0_shared = e, w, w + shared * e
     two = c1 * x1 + c2 * x2 + gain * x3
     three = (a1 * x1 + a2 * x2 + a3 * x3 + parameters[mode, K0]) + k2 * e + kv * w
-    two_0, both_0, shared_0 = two, two + three, shared * three
     coefficients[0, 0], coefficients[1, 0], coefficients[2, 0] = x1, x2, x3
-    place_pack(work, 0, packed(two, both_0, three, 0.0))
-    place_pack(work, faded, packed(e, w, shared * e, 0.0))
-    x1, x2, x3 = x2 + x3, two, three
-    coefficients[0, 1], coefficients[1, 1], coefficients[2, 1] = x1, x2, x3
-    e, w = rate2 * (two * e0), ratev * (two * w0 + three * w0_shared)
-    place_pack(work, faded + 4, packed(e, w, shared * e, 0.0))
-    for i in range(1, order):
-        step = 1.0 / (i + 1)
-        even, odd = spread(4, 0.0), spread(4, 0.0)
-        for pair in range((i - 1) >> 1):
-            at = 8 * pair + 4
-            back = faded + 4 * i - at
-            odd = fused(pack_at(4, work, at), pack_at(4, work, back), odd)
-            even = fused(pack_at(4, work, at + 4), pack_at(4, work, back - 4), even)
-        if i & 1 == 0:
-            odd = fused(pack_at(4, work, 4 * i - 4), pack_at(4, work, faded + 4), odd)
-        known = even + odd
-        two = c1 * x1 + c2 * x2 + gain * x3
-        three = (a1 * x1 + a2 * x2 + a3 * x3) + k2 * e + kv * w
-        fade = (number_of(known, 0) + two_0 * e) + two * e0
-        slide = (number_of(known, 1) + number_of(known, 2)) + (both_0 * w + shared_0 * e)
-        slide = (slide + two * w0) + three * w0_shared
-        place_pack(work, 4 * i, packed(two, two + three, three, 0.0))
-        x1, x2, x3 = (x2 + x3) * step, two * step, three * step
-        coefficients[0, i + 1], coefficients[1, i + 1], coefficients[2, i + 1] = x1, x2, x3
-        e, w = rate2 * step * fade, ratev * step * slide
-        place_pack(work, faded + 4 * i + 4, packed(e, w, shared * e, 0.0))
+    x1 = x2 + x3
+    coefficients[0, 1], coefficients[1, 1], coefficients[2, 1] = x1, two, three
+    f, g, h = rate2 * e, ratev * w, ratev * (w + shared * e)
+    e, w = f * two, g * two + h * three
+    by1 = packed(c1, a1, f * c1, g * c1 + h * a1)
+    by2 = packed(c2, a2, f * c2, g * c2 + h * a2)
+    by3 = packed(gain, a3, f * gain, g * gain + h * a3)
+    by_e = packed(0.0, k2, rate2 * two, ratev * shared * three + h * k2)
+    by_w = packed(0.0, kv, 0.0, ratev * (two + three) + h * kv)
+    more2 = packed(0.0, 0.0, rate2 * e, ratev * w)
+    more3 = packed(0.0, 0.0, 0.0, ratev * (w + shared * e))
+    slope = fused(by_e, spread(4, e), by_w * spread(4, w))
+    slope = fused(by3, spread(4, three), slope)
+    slope = fused(by1, spread(4, x1), fused(by2, spread(4, two), slope))
+    x1 = 0.5 * (two + three)
+    y = slope * spread(4, 0.5)
+    coefficients[0, 2], coefficients[1, 2], coefficients[2, 2] = x1, number_of(y, 0), number_of(y, 1)
+    two, three = number_of(slope, 0), number_of(slope, 1)
+    second_e = packed(0.0, 0.0, rate2 * two, ratev * shared * three)
+    second_w = packed(0.0, 0.0, 0.0, ratev * (two + three))
+    rates, shares = packed(0.0, ratev, rate2, ratev), packed(0.0, shared * ratev, 0.0, 0.0)
+    by2, by3 = by2 + more2, by3 + more3
+    faded = fadings(order)
+    given = (coefficients, work, faded, by1, by_e, by_w, more2, more3, second_e, second_w, rates, shares)
+    unrolled(NEXT_ORDER, 2, order, (x1, y, by2, by3, spread(4, 0.0)), given)
     if max(fall2, fallv) > order:
-        return reach_of(work, order, rate2, ratev, fall2, fallv)
+        for k in range(1, order + 1):
+            x2, v = coefficients[1, k], coefficients[1, k] + coefficients[2, k]
+            place_pack(work, 4 * k, packed(rate2 * x2, ratev * v, 0.0, 0.0))
+        reach: float = reach_of(work, 0, order, fall2, fallv)
+        return reach
     return inf
+
+
+@specialised
+def _next_order(i: int, carried: Any, given: Any) -> Any:
+    """Coefficients i + 1 from those up to i >= 2; `carried` from one order to the next, `given` for all."""
+    x1, y, by2, by3, second = carried
+    coefficients, work, faded, by1, by_e, by_w, more2, more3, second_e, second_w, rates, shares = given
+    step = spread(4, 1.0 / (i + 1))
+    one, other = spread(4, 0.0), spread(4, 0.0)
+    if i & 1 == 0 and i > 2:
+        one = pack_at(4, work, 2 * i) * pack_at(4, work, faded + 2 * i)
+    for j in range((i - 1) >> 1, 1, -1):
+        at, back = 4 * j, 4 * (i - j)
+        one = fused(pack_at(4, work, at), pack_at(4, work, faded + back), one)
+        other = fused(pack_at(4, work, back), pack_at(4, work, faded + at), other)
+    known = one + other
+    known = packed(0.0, 0.0, number_of(known, 2), number_of(known, 1) + number_of(known, 3))
+    here2, here3 = spread(4, number_of(y, 0)), spread(4, number_of(y, 1))
+    here_e, here_w = spread(4, number_of(y, 2)), spread(4, number_of(y, 3))
+    fading = packed(number_of(y, 3), number_of(y, 3), number_of(y, 2), number_of(y, 3))
+    place_pack(work, faded + 4 * i, fused(here_e, shares, fading * rates))
+    by2, by3 = by2 + more2, by3 + more3
+    early = fused(by1, spread(4, x1), second) * step
+    early = fused(by_e * step, here_e, fused(by2 * step, here2, early))
+    x1 = (number_of(y, 0) + number_of(y, 1)) * number_of(step, 0)
+    y = early + fused(known, step, fused(by_w * step, here_w, (by3 * step) * here3))
+    coefficients[0, i + 1] = x1
+    coefficients[1, i + 1], coefficients[2, i + 1] = number_of(y, 0), number_of(y, 1)
+    slope = packed(number_of(y, 1), number_of(y, 1), number_of(y, 0), number_of(y, 0))
+    place_pack(work, 4 * i, slope * spread(4, i + 1.0))
+    return x1, y, by2, by3, fused(second_e, here_e, second_w * here_w)
+
+
+NEXT_ORDER: Final = passed(_next_order)
 
 
 @compiled
@@ -111,16 +165,22 @@ def fadings(order: int) -> int:
 
 
 @compiled
-def reach_of(work: FloatArray, order: int, rate2: float, ratev: float, fall2: float, fallv: float) -> float:
+def reach_of(exponents: FloatArray, at: int, order: int, fall2: float, fallv: float) -> float:
     """Time within which neither exponent falls by more than `order`, nor from above to below UNSEEN.
 
-    The exponents `fall2` and `fallv` change with the rates in `work`, two of every 4 numbers.
+    Of the exponents' Taylor coefficients, that begin with `fall2` and `fallv`, those of degree k stand at
+    `at` + 4 k, two of every 4 numbers.
     """
-    reach = inf
+    allowed = packed(_allowed(fall2, order), _allowed(fallv, order), UNLIMITED, UNLIMITED)
+    power = spread(4, LONGEST)
     for k in range(1, order + 1):
-        known = pack_at(4, work, 4 * k - 4)
-        for fall, change in ((fall2, rate2 * number_of(known, 0)), (fallv, ratev * number_of(known, 1))):
-            if fall > order and change != 0.0:
-                allowed = max(float(order), fall - UNSEEN)
-                reach = min(reach, 0.5 * (allowed * k / abs(change)) ** (1.0 / k))
-    return reach
+        change = larger(magnitude(pack_at(4, exponents, at + 4 * k)), spread(4, SMALLEST))
+        power = smaller(rough_log2(allowed / change) * spread(4, 1.0 / k), power)
+    reach = rough_power_of_two(power)
+    nearest: float = min(number_of(reach, 0), number_of(reach, 1))
+    return 0.5 * nearest
+
+
+@compiled
+def _allowed(fall: float, order: int) -> float:
+    return max(float(order), fall - UNSEEN) if fall > order else UNLIMITED

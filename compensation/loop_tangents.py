@@ -12,8 +12,8 @@ from __future__ import annotations
 from math import exp, expm1
 from typing import Any, Final
 
-from compensation.bell_series import BELL, rate_of
-from compensation.loop_modes import field, mode_series
+from compensation.bell_series import BELL, bell_series, rate_of
+from compensation.loop_modes import field
 from compensation.loop_parameters import (
     A1,
     A2,
@@ -86,7 +86,7 @@ def tangent_series(
     work: FloatArray,
 ) -> float:
     """Taylor coefficients of the state and of two deviations into rows 0..8, shapes 1 or 2."""
-    reach = mode_series(signs, state[:STATES], parameters, order, coefficients, work)
+    reach = bell_series(signs, state[:STATES], parameters, order, coefficients, work)
     mode = slip_row(signs)
     bell2, bellv = parameters[mode, SHAPE2] == BELL, parameters[mode, SHAPEV] == BELL
     rate2 = rate_of(parameters[mode, SIGN2], parameters[mode, WIDTH2], bell2)

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from ident.simulation.compiled import compiled, specialised
 from ident.simulation.filippov_system import FilippovSystem, FloatArray, OneStepMethod, Signs
+from ident.simulation.polynomials import evaluate
 
 
 @compiled
@@ -70,9 +71,5 @@ def carry(
         length, degree, suggested = method.step(
             system, signs, state, parameters, tolerance, left, suggested, polynomials, work
         )
-        for i in range(state.size):
-            value = polynomials[i, degree]
-            for k in range(degree - 1, -1, -1):
-                value += polynomials[i, k]
-            state[i] = value
+        evaluate(polynomials, state.size, degree, 1.0, state)
         left = left - length if length < left else 0.0

@@ -145,6 +145,32 @@ def calls(signature: Signature) -> Callable[[int, tuple[Any, ...]], Any]:
     return cast("Callable[[int, tuple[Any, ...]], Any]", call)
 
 
+def generated(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A function of kernels whose machine code `function` generates; literal arguments are known to it."""
+    return cast("Callable[..., Any]", intrinsic(prefer_literal=True)(function))
+
+
+@generated
+def unrolled(typing_context: Any, turn: Any, first: Any, stop: Any, carried: Any, given: Any) -> Any:
+    """unrolled(turn, first, stop, carried, given): a loop laid out turn after turn; its bounds are literals.
+
+    `carried` becomes turn(i, carried, given) for i = first..stop - 1, where `turn` is a passed kernel. Every
+    i is a constant to the compiler, which lays out the loops inside a turn as well: short loops whose length
+    changes with every turn cost more than what they compute.
+    """
+    form = typing_context.resolve_function_type(turn, (numba_types.int64, carried, given), {})
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        function = context.get_function(turn, form)
+        context.add_linking_libs(getattr(function, "libs", ()))
+        value = args[3]
+        for i in range(first.literal_value, stop.literal_value):
+            value = function(builder, (ir.Constant(ir.IntType(64), i), value, args[4]))
+        return value
+
+    return form.return_type(turn, first, stop, carried, given), generate
+
+
 class _ReachingCache(FunctionCache):
     """numba's file cache with the digest of all that the kernel reaches in its key, and of how it is made."""
 

@@ -133,13 +133,3 @@ def _shift(q: FloatArray, degree: int, by: float) -> None:
         for k in range(degree - 1, i - 1, -1):
             value = q[k] + by * value
             q[k] = value
-
-
-@compiled
-def evaluate(polynomials: FloatArray, rows: int, degree: int, at: float, out: FloatArray) -> None:
-    """Values (rows,) of the first `rows` polynomials, ascending coefficients, at theta = `at`."""
-    for i in range(rows):
-        value = polynomials[i, degree]
-        for k in range(degree - 1, -1, -1):
-            value = value * at + polynomials[i, k]
-        out[i] = value

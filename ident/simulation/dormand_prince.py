@@ -16,7 +16,6 @@ import numpy as np
 from scipy.integrate import DOP853
 
 from ident.simulation.compiled import compiled, passed, specialised
-from ident.simulation.crossing import evaluate
 from ident.simulation.filippov_system import (
     FilippovSystem,
     FloatArray,
@@ -25,6 +24,7 @@ from ident.simulation.filippov_system import (
     Surfaces,
     switching_value,
 )
+from ident.simulation.polynomials import evaluate
 
 DEGREE = 7
 STAGES = 16  # 12 of the step, the derivative at its end, 3 of the dense output

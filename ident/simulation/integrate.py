@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from ident.simulation.compiled import compiled, specialised
-from ident.simulation.crossing import evaluate, first_crossing
+from ident.simulation.crossing import first_crossing
 from ident.simulation.filippov_system import (
     TANGENT_STEP,
     FilippovSystem,
@@ -34,6 +34,7 @@ from ident.simulation.filippov_system import (
     resolve,
     switching_value,
 )
+from ident.simulation.polynomials import evaluate, sum_up
 from ident.simulation.taylor import ORDER
 
 TIME_REACHED: Final = 0
@@ -160,7 +161,7 @@ def integrate(
             length, degree, suggested = method.step(
                 system, signs, state, parameters, settings.tolerance, left, suggested, polynomials, work
             )
-            _sum_up(polynomials, n, degree, after, spread)
+            sum_up(polynomials, n, degree, after, spread)
             if not _finite(spread):
                 return Progress(time, NOT_FINITE, output, events, step)
             part = 1.0
@@ -232,18 +233,6 @@ def _slides(signs: Signs) -> bool:
         if signs[i] == 0:
             sliding += 1
     return sliding > 0
-
-
-@compiled
-def _sum_up(polynomials: FloatArray, n: int, degree: int, end: FloatArray, spread: FloatArray) -> None:
-    """Values (n,) at the end of a step, and the furthest (n,) that they can be from its beginning."""
-    for i in range(n):
-        value, bound = 0.0, 0.0
-        for k in range(degree, 0, -1):
-            value += polynomials[i, k]
-            bound += abs(polynomials[i, k])
-        end[i] = value + polynomials[i, 0]
-        spread[i] = bound
 
 
 @compiled

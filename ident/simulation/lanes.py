@@ -16,18 +16,16 @@ import numpy as np
 from ident.simulation.compiled import owning, specialised
 from ident.simulation.filippov_system import FloatArray, Signs, Surfaces
 from ident.simulation.integrate import STEP_LIMIT, TIME_REACHED, Progress
-from ident.simulation.pack_functions import rough_power_of_two
 from ident.simulation.packs import (
     fused,
     larger,
     magnitude,
     pack_at,
     place_pack,
-    rough_log2,
     smaller,
     spread,
 )
-from ident.simulation.taylor import ORDER, SMALLEST
+from ident.simulation.taylor import ORDER, SMALLEST, true_length
 
 LANES: Final = 8
 WORK_SERIES: Final = 8  # rows of memory for a system's own series
@@ -35,7 +33,6 @@ ALONE_FIRST: Final = (
     4  # steps that a trajectory takes alone: to the surface, and off it; doubled if not enough
 )
 IDLE: Final = -1
-LAST, BEFORE = 1.0 / ORDER, 1.0 / (ORDER - 1)
 
 
 class LaneSystem(NamedTuple):
@@ -283,10 +280,8 @@ def _step(
         last = larger(magnitude(pack_at(8, coefficients, row + ORDER * LANES)), last)
         before = larger(magnitude(pack_at(8, coefficients, row + (ORDER - 1) * LANES)), before)
     allowed = spread(8, tolerance) * larger(size, spread(8, SMALLEST))
-    power = smaller(
-        rough_log2(allowed / last) * spread(8, LAST), rough_log2(allowed / before) * spread(8, BEFORE)
-    )
-    length = smaller(smaller(rough_power_of_two(power), pack_at(8, reach, 0)), pack_at(8, left, 0))
+    longest = smaller(pack_at(8, reach, 0), pack_at(8, left, 0))
+    length = smaller(true_length(allowed, last, before), longest)
     place_pack(lengths, 0, length)
     for i in range(n):
         row = i * (ORDER + 1) * LANES

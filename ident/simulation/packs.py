@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable
-from typing import Any, cast
+from typing import Any
 
 from llvmlite import ir
 from numba.core import cgutils, types
@@ -21,7 +21,8 @@ from numba.core.datamodel.models import PrimitiveModel
 from numba.core.datamodel.registry import register_default
 from numba.core.imputils import lower_builtin
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic
+
+from ident.simulation.compiled import generated
 
 DOUBLE = ir.DoubleType()
 INDEX = ir.IntType(32)
@@ -48,11 +49,6 @@ class _PackModel(PrimitiveModel):
 
 
 register_default(Pack)(_PackModel)
-
-
-def _generated(function: Callable[..., Any]) -> Callable[..., Any]:
-    """A function of kernels whose machine code `function` generates; literal arguments are known to it."""
-    return cast("Callable[..., Any]", intrinsic(prefer_literal=True)(function))
 
 
 def _arithmetic(operation: Callable[..., Any], instruction: str) -> None:
@@ -82,7 +78,7 @@ def _pointer(context: Any, builder: Any, array_type: Any, array: Any, index: Any
     return builder.bitcast(builder.gep(data, [index], inbounds=True), kind.vector.as_pointer())
 
 
-@_generated
+@generated
 def pack_at(typing_context: Any, width: Any, array: Any, index: Any) -> Any:
     """pack_at(width, array, index): the `width` numbers of a contiguous array from a flat index on."""
     kind = Pack(width.literal_value)
@@ -94,7 +90,7 @@ def pack_at(typing_context: Any, width: Any, array: Any, index: Any) -> Any:
     return kind(width, array, types.intp), generate
 
 
-@_generated
+@generated
 def place_pack(typing_context: Any, array: Any, index: Any, pack: Any) -> Any:
     """place_pack(array, index, pack): write a pack to a contiguous array from a flat index on."""
 
@@ -105,7 +101,7 @@ def place_pack(typing_context: Any, array: Any, index: Any, pack: Any) -> Any:
     return types.void(array, types.intp, pack), generate
 
 
-@_generated
+@generated
 def spread(typing_context: Any, width: Any, number: Any) -> Any:
     """spread(width, number): a pack of one number."""
     kind = Pack(width.literal_value)
@@ -116,7 +112,7 @@ def spread(typing_context: Any, width: Any, number: Any) -> Any:
     return kind(width, types.float64), generate
 
 
-@_generated
+@generated
 def spread_as(typing_context: Any, pack: Any, number: Any) -> Any:
     """spread_as(pack, number): a pack of one number, as wide as another."""
 
@@ -126,7 +122,7 @@ def spread_as(typing_context: Any, pack: Any, number: Any) -> Any:
     return pack(pack, types.float64), generate
 
 
-@_generated
+@generated
 def packed(typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
     """packed(a, b, c, d): a pack of four numbers."""
     kind = Pack(4)
@@ -140,7 +136,7 @@ def packed(typing_context: Any, a: Any, b: Any, c: Any, d: Any) -> Any:
     return kind(types.float64, types.float64, types.float64, types.float64), generate
 
 
-@_generated
+@generated
 def number_of(typing_context: Any, pack: Any, place: Any) -> Any:
     """number_of(pack, place): one of a pack's numbers; the place is a literal."""
 
@@ -150,7 +146,7 @@ def number_of(typing_context: Any, pack: Any, place: Any) -> Any:
     return types.float64(pack, place), generate
 
 
-@_generated
+@generated
 def larger(typing_context: Any, a: Any, b: Any) -> Any:
     """larger(a, b): the larger of two packs, number by number; where one is nan, the second."""
 
@@ -160,7 +156,7 @@ def larger(typing_context: Any, a: Any, b: Any) -> Any:
     return a(a, a), generate
 
 
-@_generated
+@generated
 def smaller(typing_context: Any, a: Any, b: Any) -> Any:
     """smaller(a, b): the smaller of two packs, number by number; where one is nan, the second."""
 
@@ -170,7 +166,7 @@ def smaller(typing_context: Any, a: Any, b: Any) -> Any:
     return a(a, a), generate
 
 
-@_generated
+@generated
 def chosen(typing_context: Any, sign: Any, a: Any, b: Any) -> Any:
     """chosen(sign, a, b): a where sign <= 0, else b, number by number."""
 
@@ -181,7 +177,22 @@ def chosen(typing_context: Any, sign: Any, a: Any, b: Any) -> Any:
     return sign(sign, sign, sign), generate
 
 
-@_generated
+@generated
+def total(typing_context: Any, pack: Any) -> Any:
+    """total(pack): the sum of the numbers of a pack, in two halves."""
+
+    def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        numbers = [builder.extract_element(args[0], INDEX(place)) for place in range(pack.width)]
+        while len(numbers) > 1:
+            half = len(numbers) // 2
+            pairs = zip(numbers[:half], numbers[half:], strict=True)
+            numbers = [builder.fadd(one, other) for one, other in pairs]
+        return numbers[0]
+
+    return types.float64(pack), generate
+
+
+@generated
 def magnitude(typing_context: Any, a: Any) -> Any:
     """magnitude(a): |a|, number by number."""
 
@@ -191,7 +202,7 @@ def magnitude(typing_context: Any, a: Any) -> Any:
     return a(a), generate
 
 
-@_generated
+@generated
 def nearest(typing_context: Any, a: Any) -> Any:
     """nearest(a): the nearest whole numbers, the even of two."""
 
@@ -201,7 +212,7 @@ def nearest(typing_context: Any, a: Any) -> Any:
     return a(a), generate
 
 
-@_generated
+@generated
 def scaled_two(typing_context: Any, a: Any) -> Any:
     """scaled_two(a): 2^a for whole numbers a within -1022 and 1023."""
 
@@ -214,7 +225,7 @@ def scaled_two(typing_context: Any, a: Any) -> Any:
     return a(a), generate
 
 
-@_generated
+@generated
 def rough_log2(typing_context: Any, a: Any) -> Any:
     """rough_log2(a): log2 of positive numbers, at most 0.086 too small: exponent and fraction as they are."""
 
@@ -241,7 +252,7 @@ def _call(builder: Any, name: str, kind: Pack, args: Any) -> Any:
     return builder.call(function, args)
 
 
-@_generated
+@generated
 def fused(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
     """fused(a, b, c): a b + c of three packs, in one rounding where the machine can."""
 

@@ -6,19 +6,36 @@ Zou (2005): with the coefficients c_k of a series of order p, h is the smaller o
 
 The order is the same for every tolerance. A component that decays at a rate mu bounds the step by the
 stability of the truncated series, mu h < p/e about, however loose the tolerance is: a high order serves stiff
-modes at loose tolerances as it serves tight ones.
+modes at loose tolerances as it serves tight ones. Constant factors on the last terms, chosen for stability as
+those of Runge-Kutta-Chebyshev methods are, would allow mu h = 13 on the real axis with two of them and 24
+with six, but only 9.2 and 11.5 where eigenvalues lie 60 degrees off it, which is where a coupled observer has
+them; and they cost accuracy, so that a trajectory takes no fewer steps at the same error.
 """
 
 from __future__ import annotations
 
-from math import exp, log
-from typing import Final
+from typing import Any, Final
 
 from ident.simulation.compiled import passed, specialised
 from ident.simulation.filippov_system import FilippovSystem, FloatArray, OneStepMethod, Signs, Surfaces
+from ident.simulation.pack_functions import rough_power_of_two
+from ident.simulation.packs import number_of, rough_log2, smaller, spread, spread_as
+from ident.simulation.polynomials import scale
 
 ORDER: Final = 20
 SMALLEST: Final = 1e-300  # stands for a coefficient that vanishes
+
+
+@specialised
+def true_length(allowed: Any, last: Any, before: Any) -> Any:
+    """Length (a pack) of steps whose last two terms are `allowed`, to a hundredth.
+
+    `last` and `before` are the magnitudes of the last two coefficients, `SMALLEST` at least.
+    """
+    most = rough_log2(allowed)
+    by_last = (most - rough_log2(last)) * spread_as(last, 1.0 / ORDER)
+    by_before = (most - rough_log2(before)) * spread_as(before, 1.0 / (ORDER - 1))
+    return rough_power_of_two(smaller(by_last, by_before))
 
 
 @specialised
@@ -43,25 +60,18 @@ def taylor_step(
     if longest < 0.0:
         length = -longest
     else:
-        size = 0.0
-        last = 0.0
-        before = 0.0
+        size, last, before = 0.0, SMALLEST, SMALLEST
         for i in range(n):
             size = max(size, abs(state[i]))
             last = max(last, abs(polynomials[i, ORDER]))
             before = max(before, abs(polynomials[i, ORDER - 1]))
         if size > 0.0:
-            allowed = tolerance * size
-            by_last = log(allowed / max(last, SMALLEST)) / ORDER
-            by_before = log(allowed / max(before, SMALLEST)) / (ORDER - 1)
-            length = min(longest, reach, exp(min(by_last, by_before)))
+            allowed = spread(4, tolerance * size)
+            longest_true = number_of(true_length(allowed, spread(4, last), spread(4, before)), 0)
+            length = min(longest, reach, longest_true)
         else:
             length = min(longest, reach, 1e-3 / (1.0 + last ** (1.0 / ORDER)))
-    power = 1.0
-    for k in range(1, ORDER + 1):
-        power *= length
-        for i in range(n):
-            polynomials[i, k] *= power
+    scale(polynomials, n, ORDER, length)
     return length, ORDER, suggested
 
 

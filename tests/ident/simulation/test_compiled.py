@@ -4,6 +4,9 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
+
+from ident.simulation.compiled import compiled, passed, specialised, unrolled
 
 LOW = """
 from ident.simulation.compiled import compiled, specialised
@@ -70,3 +73,24 @@ def test_a_kernel_called_by_its_address_is_never_stale_and_its_caller_not_compil
     assert run(tmp_path) == (3.0, 1)
     (tmp_path / "low.py").write_text(LOW.format(scale=5.0))
     assert run(tmp_path) == (6.0, 1)
+
+
+@specialised
+def turn(i: int, carried: Any, given: float) -> Any:
+    total, product = carried
+    for j in range(i):
+        total += given * j
+    return total, product * i
+
+
+TURN = passed(turn)
+
+
+@compiled
+def turns(given: float) -> tuple[float, float]:
+    total, product = unrolled(TURN, 2, 7, (0.0, 1.0), given)
+    return float(total), float(product)
+
+
+def test_an_unrolled_loop_takes_every_turn_in_order() -> None:
+    assert turns(0.5) == (0.5 * sum(j for i in range(2, 7) for j in range(i)), 720.0)
