@@ -16,11 +16,12 @@ from compensation.orbits.periodic_orbits import Returns
 from ident.model.friction import StribeckFriction
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
-from ident.simulation.integrate import END_REASONS, SECTION
+from ident.simulation.integrate import END_REASONS, EQUILIBRIUM, SECTION
 
 TOLERANCE: Final = 1e-13  # of a step; series lose nothing by it
 TOLERANCE_ELSE: Final = 1e-11  # of a Dormand-Prince step
 GAIN_NAMES: Final = {"r": "compensation", "L": "observer", "n1": "proportional", "n2": "derivative"}
+STILL: Final = 1e-12  # of x1, by which a link that rests may move between its halts: by rounding
 PATIENCE: Final = 200.0  # [s] for one half turn
 
 
@@ -59,6 +60,9 @@ class LoopSection:
         made, reason = returns(
             run_for(parameters), parameters, self.symmetric, self._tolerance, PATIENCE, state, rows
         )
+        still = rows[:made, 4] - rows[:made, 3] <= STILL * np.abs(rows[:made, 0])
+        if still.any():  # at the edge of an equilibrium set
+            made, reason = int(np.argmax(still)), EQUILIBRIUM
         rows = rows[:made]
         return Returns(rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], END_REASONS[reason])
 

@@ -7,9 +7,10 @@ import pytest
 
 from compensation.closed_loop import ClosedLoop, simulate
 from compensation.controller import Controller, Gains
+from compensation.equilibria import equilibrium_set
 from compensation.loop_section import LoopSection, with_gain
 from compensation.orbits.periodic_orbits import Cycle, NoCycle, find_cycle
-from ident.model.friction import StribeckFriction
+from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
@@ -138,3 +139,17 @@ def test_with_gain_changes_one_gain() -> None:
     loop = section(1.0).loop
     assert with_gain(loop, "L", 50.0).controller.gains == replace(loop.controller.gains, observer=50.0)
     assert with_gain(loop, "r", 0.9).controller.gains == replace(loop.controller.gains, compensation=0.9)
+
+
+def test_a_link_that_rests_at_the_edge_of_its_set_makes_no_cycle() -> None:
+    """Its halts are apart by rounding alone, and come back to each other every 0.13 s."""
+    curve = StribeckCurve(
+        0.8609818745843592, 0.5541278616511862, 0.06013112907925833, 0.1269195760520449, 2.0
+    )
+    robot = OneLinkRobot(0.025017337646208872, StribeckFriction.symmetric(curve))
+    gains = Gains(0.34048701102624923, 0.007095031074440761, 151.5068879522968, 0.987121)
+    loop = ClosedLoop(robot, Controller(gains, robot))
+    rest = equilibrium_set(robot, loop.controller).x1_max
+    for x1 in (0.1, -0.1, 0.6, rest, rest * (1.0 + 1e-15), rest * (1.0 + 1e-12)):
+        found = find_cycle(LoopSection(loop), np.array([x1, 0.0]))
+        assert found == NoCycle("equilibrium")
