@@ -1,13 +1,15 @@
 """The stable limit cycles of a closed loop at every value of a gain.
 
 Cycles are followed upwards from value to value, beside new starts on both sides and far and near, and then
-downwards from what was found: attractors that coexist are found too. A symmetric loop is swept by a kernel
+downwards from what was found: attractors that coexist are found too. A cycle of a symmetric loop that is not
+symmetric itself has a mirror image, and both are given. A symmetric loop is swept by a kernel
 (`loop_sweep`); what that leaves undecided, and asymmetric loops, are searched value by value.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -34,8 +36,9 @@ def stable_cycles(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> l
         else _searched(loop, parameter, grid)
     )
     for index in range(grid.size - 2, -1, -1):
+        here = found[index]
         for cycle in found[index + 1]:
-            if len(found[index]) < len(found[index + 1]):
+            if len(here) < len(found[index + 1]) or all(cycle.returns != one.returns for one in here):
                 _add(found[index], cycle_near(loop, parameter, float(grid[index]), cycle))
     return found
 
@@ -44,9 +47,12 @@ def cycle_near(loop: ClosedLoop, parameter: Parameter, value: float, cycle: Cycl
     """The cycle at a value of the gain to which another value's cycle leads."""
     section = LoopSection(with_gain(loop, parameter, value))
     if section.symmetric and section.by_series and cycle.returns == 1:
-        (found,) = _swept(loop, parameter, np.array([value]), cycle.point)
-        return found[0] if found else NoCycle("leads to no stable cycle")
-    return find_cycle(section, cycle.point)
+        (stable,) = _swept(loop, parameter, np.array([value]), cycle.point)
+        return stable[0] if stable else NoCycle("leads to no stable cycle")
+    found = find_cycle(section, cycle.point)
+    if isinstance(found, Cycle) and _has_mirror(found, section):
+        return min(found, mirrored(found, section), key=lambda one: distance(one, cycle))
+    return found
 
 
 def distance(one: Cycle, other: Cycle) -> float:
@@ -54,6 +60,12 @@ def distance(one: Cycle, other: Cycle) -> float:
     size = max(one.amplitude, other.amplitude)
     extremes = max(abs(one.x1_min - other.x1_min), abs(one.x1_max - other.x1_max)) / size
     return max(extremes, abs(one.period - other.period) / max(one.period, other.period))
+
+
+def mirrored(cycle: Cycle, section: LoopSection) -> Cycle:
+    """The mirror image of an asymmetric cycle of a symmetric loop: in its map, the other half turn."""
+    (point,) = section.follow(cycle.point, 1).points
+    return replace(cycle, point=point, x1_min=-cycle.x1_max, x1_max=-cycle.x1_min)
 
 
 def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, cold: FloatArray) -> list[list[Cycle]]:
@@ -78,7 +90,7 @@ def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, cold: Float
             known: list[Cycle] = []
             point = found[-1][0].point if found and found[-1] else cold
             section = LoopSection(with_gain(loop, parameter, float(grid[len(found)])))
-            _add(known, find_cycle(section, point))
+            _add_with_mirror(known, find_cycle(section, point), section)
             found.append(known)
     return found
 
@@ -114,12 +126,23 @@ def _searched(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> list[
         warm = [cycle.point for cycle in found[-1]] if found else []
         cold = STARTS[:1] if section.symmetric else STARTS
         for point in warm:
-            _add(known, find_cycle(section, point))
+            _add_with_mirror(known, find_cycle(section, point), section)
         if not (section.symmetric and warm):
             for x1 in cold:
-                _add(known, find_cycle(section, np.array([x1, 0.0])))
+                _add_with_mirror(known, find_cycle(section, np.array([x1, 0.0])), section)
         found.append(known)
     return found
+
+
+def _has_mirror(cycle: Cycle, section: LoopSection) -> bool:
+    """Whether the loop is symmetric and the cycle is not."""
+    return section.symmetric and cycle.returns % 2 == 0
+
+
+def _add_with_mirror(known: list[Cycle], candidate: Cycle | NoCycle, section: LoopSection) -> None:
+    _add(known, candidate)
+    if isinstance(candidate, Cycle) and _has_mirror(candidate, section):
+        _add(known, mirrored(candidate, section))
 
 
 def _add(known: list[Cycle], candidate: Cycle | NoCycle) -> None:
