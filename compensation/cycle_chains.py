@@ -19,9 +19,8 @@ from compensation.orbits.periodic_orbits import Cycle
 from ident.simulation.filippov_system import FloatArray
 
 OFF_TREND: Final = 0.25  # of its neighbours' steps, by which a step may differ from their mean
-OFF_TREND_AT_EDGES: Final = 0.5  # the same at an edge of the grid, where the trend is known from one side
-OFF_TREND_AT_ENDS: Final = (2.0, 1.0)  # the same where a branch begins or ends, and changes fastest
-ROUNDING: Final = 1e-6  # relative change that is no step
+OFF_TREND_AT_ENDS: Final = 0.5  # the same at the ends of a chain, where the trend is known from one side
+SMALLEST: Final = 2e-3  # relative change of extremes or period, below which no jump is looked for
 FEWEST: Final = 4  # cycles that have a trend
 
 
@@ -77,13 +76,9 @@ def suspects(chain: Chain, grid: FloatArray) -> list[int]:
     usual = 0.5 * (np.abs(before) + np.abs(after))
     size = np.maximum(np.abs(rows[:-1]), np.abs(rows[1:]))
     least = np.full((len(slopes), 1), OFF_TREND)
-    least[0] = least[-1] = OFF_TREND_AT_EDGES
-    if chain.first > 0:
-        least[:2, 0] = OFF_TREND_AT_ENDS
-    if chain.last < grid.size - 1:
-        least[:-3:-1, 0] = OFF_TREND_AT_ENDS
+    least[0] = least[-1] = OFF_TREND_AT_ENDS
     nearby = np.zeros((len(slopes) + 2, 3))
     nearby[2:-2] = off[1:-1]  # what is off at an end may be so by the step beside it
-    strays = (off > least * usual + ROUNDING * size / widths) & (off >= nearby[:-2]) & (off >= nearby[2:])
+    strays = (off > least * usual + SMALLEST * size / widths) & (off >= nearby[:-2]) & (off >= nearby[2:])
     places: list[int] = np.flatnonzero(np.any(strays, axis=1)).tolist()
     return places

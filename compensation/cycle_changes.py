@@ -180,9 +180,9 @@ def _at_others(
 class _Last:
     """The last cycle that is known to be on a chain, and how the chain goes on from there."""
 
-    value: float  # of the gain
+    value: float  # r [-] or L [1/s]
     cycle: Cycle
-    slope: FloatArray | None = None  # (5,) of x1_min, x1_max, period and the section's point, by the gain
+    slope: FloatArray | None = None  # (5,) of x1_min [rad], x1_max, period [s] and the point, by the gain
 
     def after(self, before: Place) -> _Last:
         """The same, with the slope from the one before."""

@@ -65,12 +65,11 @@ def random_loop(seed: int) -> ClosedLoop:
     generator = np.random.default_rng(seed)
     coulomb = generator.uniform(0.2, 0.6)
     shape = float(generator.choice([1.0, 1.0, 2.0]))
-    values = np.array([coulomb + generator.uniform(0.05, 0.4), coulomb, generator.uniform(0.05, 0.2), 0.06])
-    curves = [StribeckCurve(*(float(v) for v in values), shape)] * 2
+    static, width = coulomb + generator.uniform(0.05, 0.4), generator.uniform(0.05, 0.2)
+    curves = [StribeckCurve(static, coulomb, width, 0.06, shape)] * 2
     if seed % 2:
-        values[[0, 2]] *= generator.uniform(0.85, 1.2, 2)
-        values[0] = max(values[0], coulomb)
-        curves[1] = StribeckCurve(*(float(v) for v in values), shape)
+        more, wider = generator.uniform(0.85, 1.2, 2).tolist()
+        curves[1] = StribeckCurve(max(more * static, coulomb), coulomb, wider * width, 0.06, shape)
     robot = OneLinkRobot(float(generator.uniform(0.015, 0.05)), StribeckFriction(curves[0], curves[1]))
     observer = max(critical_observer_gains(robot).mean, 20.0) * generator.uniform(0.6, 1.4)
     gains = Gains(float(generator.uniform(0.2, 0.8)), 0.03, float(observer), 1.05)
