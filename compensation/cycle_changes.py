@@ -31,6 +31,7 @@ HALVINGS: Final = 12  # of an interval that may hold a jump
 STAYED: Final = 0.15  # of the change over the interval, that a jump leaves of it
 END_BISECTIONS: Final = 12  # of the ends of a chain beyond which there is nothing
 LOCATED: Final = 1e-6  # of an interval, to which an end at other cycles or a change of modes is located
+RESOLVED: Final = 4e-16  # relative difference of numbers that can just be told apart
 LOCATED_IN_PASSING: Final = 2.5e-4  # the same of a change between two values of which one has no cycle
 SAME_RETURN: Final = 0.25  # relative step of the section's point, above which it may be another return
 CONTINUOUS: Final = 0.25  # amplitude at an onset, relative to the next point, below which it grows from zero
@@ -131,32 +132,31 @@ def _at_nothing(loop: ClosedLoop, parameter: Parameter, last: _Last, outer: floa
     bad = outer
     for _ in range(END_BISECTIONS):
         middle = 0.5 * (passed[-1].value + bad)
+        if middle in (passed[-1].value, bad):
+            break
         found = cycle_near(loop, parameter, middle, passed[-1].cycle)
         if isinstance(found, Cycle) and found.stable:
             passed.append(_Last(middle, found).after((passed[-1].value, passed[-1].cycle)))
         else:
             bad = middle
-    end = passed[-1]
-    word = "appears" if outer < last.value else "vanishes"
-    small = end.cycle.amplitude < CONTINUOUS * last.cycle.amplitude
-    yield Change(end.value, f"limit cycle {word}, {'from zero amplitude' if small else 'with a jump'}")
+    yield _beside_nothing(last, passed[-1], outer)
     for one, other in pairwise(passed):
         if one.cycle.returns != other.cycle.returns:
-            fine = LOCATED_IN_PASSING * abs(outer - last.value)
-            yield _at_others(loop, parameter, one, [(other.value, other.cycle)], fine)
+            coarse = LOCATED_IN_PASSING * abs(outer - last.value)
+            yield _at_others(loop, parameter, one, [(other.value, other.cycle)], coarse)
 
 
 def _at_others(
-    loop: ClosedLoop, parameter: Parameter, last: _Last, others: Sequence[Place], fine: float | None = None
+    loop: ClosedLoop, parameter: Parameter, last: _Last, others: Sequence[Place], coarse: float = 0.0
 ) -> Change:
-    """The end of a chain at a value with others, located to `fine`.
+    """The end of a chain at a value with others, located to `coarse` or better.
 
     A cycle found in between is on the chain if it takes as many returns and is nearer to the chain's trend
     than to the others.
     """
-    known = list(others)
+    begun, known = last, list(others)
     bad = known[0][0]
-    fine = LOCATED * abs(bad - last.value) if fine is None else fine
+    fine = max(_fine(last.value, bad), coarse)
     beyond: Place | None = min(known, key=lambda other: distance(other[1], last.cycle))
     while abs(bad - last.value) > fine:
         middle = 0.5 * (last.value + bad)
@@ -171,9 +171,20 @@ def _at_others(
         else:
             last = _Last(middle, found).after((last.value, last.cycle))
     if beyond is None:
-        word = "appears" if bad < last.value else "vanishes"
-        return Change(last.value, f"limit cycle {word}, with a jump")
+        return _beside_nothing(begun, last, bad)
     return Change(last.value, _name(loop, parameter, (last.value, last.cycle), beyond))
+
+
+def _fine(one: float, other: float) -> float:
+    """How closely a change between two values is located; numbers have an end."""
+    return max(LOCATED * abs(one - other), RESOLVED * max(abs(one), abs(other)))
+
+
+def _beside_nothing(last: _Last, end: _Last, outer: float) -> Change:
+    """The name of an end beyond which the motion finds no cycle, refined from the `last` value of a chain."""
+    word = "appears" if outer < end.value else "vanishes"
+    small = end.cycle.amplitude < CONTINUOUS * last.cycle.amplitude
+    return Change(end.value, f"limit cycle {word}, {'from zero amplitude' if small else 'with a jump'}")
 
 
 @dataclass(frozen=True)
@@ -257,7 +268,7 @@ def _changes_of_modes(
 
 def _change_of_modes(loop: ClosedLoop, parameter: Parameter, low: Place, high: Place) -> Change:
     first, last = (_modes(loop, parameter, place) for place in (low, high))
-    fine = LOCATED * (high[0] - low[0])
+    fine = _fine(low[0], high[0])
     while high[0] - low[0] > fine:
         middle = 0.5 * (low[0] + high[0])
         found = cycle_near(loop, parameter, middle, low[1])

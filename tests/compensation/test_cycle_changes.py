@@ -104,3 +104,13 @@ def test_a_jump_over_the_observer_gain_is_where_bisection_finds_it() -> None:
         else:
             high = middle
     assert jump.value == pytest.approx(low, abs=1e-4)
+
+
+@pytest.mark.parametrize("apart", [1e-12, 1e-15])
+def test_values_hardly_apart_end_the_search(apart: float) -> None:
+    """Around the jump at r = 1.0535449, and around the onset at r = 1."""
+    rig = ClosedLoop(asymmetric_robot(), Controller(Gains(0.4, 0.02, 73.5, 1.0), symmetric_robot()))
+    drawn = diagram(rig, "r", 1.0535449136 + apart * np.arange(-3, 4))
+    assert sum(len(branch.points) for branch in cycles(drawn.branches)) >= 7
+    paper = ClosedLoop(symmetric_robot(), rig.controller)
+    assert diagram(paper, "r", 1.0 + apart * np.arange(-3, 4)).branches
