@@ -30,7 +30,7 @@ from ident.simulation.filippov_system import FloatArray
 HALVINGS: Final = 12  # of an interval that may hold a jump
 STAYED: Final = 0.15  # of the change over the interval, that a jump leaves of it
 END_BISECTIONS: Final = 12  # of the ends of a chain beyond which there is nothing
-LOCATED: Final = 1e-6  # of an interval, to which an end at other cycles or a change of modes is located
+LOCATED: Final = 1e-5  # of an interval, to which an end at other cycles or a change of modes is located
 RESOLVED: Final = 4e-16  # relative difference of numbers that can just be told apart
 LOCATED_IN_PASSING: Final = 2.5e-4  # the same of a change between two values of which one has no cycle
 SAME_RETURN: Final = 0.25  # relative step of the section's point, above which it may be another return
@@ -38,7 +38,7 @@ CONTINUOUS: Final = 0.25  # amplitude at an onset, relative to the next point, b
 READINGS: Final = 32  # values from one reading of the mode sequence to the next
 ONE: Final = 1e-3  # of an interval: so near two changes of a kind are one
 DOUBLED: Final = 0.01  # relative difference of extremes just beyond a doubling of the period
-ROUNDING: Final = 1e-9  # relative difference of x1_max and -x1_min of a symmetric cycle
+ROUNDING: Final = 1e-9  # relative difference of x1_max and -x1_min of mirror images
 
 Place = tuple[float, Cycle]
 """A value of the gain and a cycle there."""
@@ -93,7 +93,9 @@ def changes_of_cycles(
 ) -> Iterator[Change]:
     """What happens within the grid to chains that hide no jumps, in no order; each change once."""
     known: list[tuple[float, str]] = []
-    for chain in chains:
+    for number, chain in enumerate(chains):
+        if any(_are_mirrored(chain, other) for other in chains[:number]):
+            continue
         for change in (
             *_ends(loop, parameter, grid, chain, chains),
             *_changes_of_modes(loop, parameter, grid, chain),
@@ -103,6 +105,15 @@ def changes_of_cycles(
             if not any(name == other and abs(change.value - value) <= near for value, other in known):
                 known.append((change.value, name))
                 yield change
+
+
+def _are_mirrored(one: Chain, other: Chain) -> bool:
+    """Whether two chains are mirror images: all that happens to one happens to the other."""
+    (low, high), (other_low, other_high) = (
+        (chain.cycles[0].x1_min, chain.cycles[0].x1_max) for chain in (one, other)
+    )
+    same = one.first == other.first and one.last == other.last
+    return same and max(abs(low + other_high), abs(high + other_low)) <= ROUNDING * (high - low)
 
 
 def _ends(
