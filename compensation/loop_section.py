@@ -67,7 +67,7 @@ class LoopSection:
         return Returns(rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], END_REASONS[reason])
 
     def derivative(self, point: FloatArray) -> FloatArray | None:
-        """Derivative (2, 2) of one return from a point (2,)."""
+        """Derivative (2, 2) of one return from a point (2,), None where the motion rests or grazes."""
         state = _state(point)
         slope = np.eye(2)
         run, carried = run_for(self._parameters), carry_for(self._parameters)
@@ -76,7 +76,7 @@ class LoopSection:
             before = state[0]
             once = np.empty((2, 2))
             _, reason = derivative(run, carried, self._parameters, *accuracy, state, once)
-            if reason != SECTION:
+            if reason != SECTION or not np.all(np.isfinite(once)):  # a link at rest slips on by rounding
                 return None
             slope = once @ slope
             if self.symmetric:

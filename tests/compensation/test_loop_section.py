@@ -153,3 +153,17 @@ def test_a_link_that_rests_at_the_edge_of_its_set_makes_no_cycle() -> None:
     for x1 in (0.1, -0.1, 0.6, rest, rest * (1.0 + 1e-15), rest * (1.0 + 1e-12)):
         found = find_cycle(LoopSection(loop), np.array([x1, 0.0]))
         assert found == NoCycle("equilibrium")
+
+
+def test_a_motion_that_comes_to_rest_has_no_derivative() -> None:
+    """It halts at the edge of its equilibrium set and slips on by a rounding, at no speed."""
+    friction = StribeckFriction(
+        StribeckCurve(0.7972744495790702, 0.5795829855197003, 0.09519846686614639, 0.08628530552394095, 2.0),
+        StribeckCurve(0.9057313263566219, 0.4803894928964654, 0.0852634198728053, 0.10271982326557003, 2.0),
+    )
+    robot = OneLinkRobot(0.051464631691412126, friction)
+    gains = Gains(0.7092780471566971, 0.07338949444526471, 70.41595121939415, 1.0122289859219886)
+    where = LoopSection(ClosedLoop(robot, Controller(gains, robot.mean())))
+    start = np.array([0.13472966548222248, -0.0006825877034719243])
+    assert where.derivative(start) is None
+    assert where.follow(start, 1).end_reason == "equilibrium"
