@@ -69,14 +69,18 @@ class Neighbourhood:
 def end_of(around: Neighbourhood, curve: Curve) -> tuple[CycleEvent, list[tuple[float, Cycle]]]:
     """The last event of a curve, and cycles by their gain which the motion settles on beyond."""
     last = curve.points[-1]
-    if curve.end_reason == RANGE or curve.end_reason.startswith("limit"):
-        return CycleEvent("end", last.p, curve.end_reason), []
+    if curve.end_reason == RANGE:
+        return CycleEvent("end", last.p, RANGE), []
     if curve.end_reason == MET_EQUILIBRIUM:
         return CycleEvent("end", _vanishing(around.equation, curve), MET_EQUILIBRIUM), []
     if curve.end_reason == JOINED:
         at = curve.events[-1] if curve.events else last
         return CycleEvent("end", at.p, JOINED), []
     beyond = _beyond(around, last)
+    if curve.end_reason.startswith(
+        "limit"
+    ):  # where an unstable branch is too stiff to follow, motion leaves it
+        return CycleEvent("end", last.p, curve.end_reason), beyond
     if curve.end_reason in LOSSES:
         return CycleEvent("end", last.p, LOSSES[curve.end_reason]), beyond
     graze = _graze(around, last)
