@@ -1,8 +1,9 @@
 """Branches of equilibria and limit cycles over the compensation gain r or the observer gain L: figure 9.
 
 For every value of the parameter the equilibrium sets come from their closed form (`rest_pieces`) and
-the limit cycles from the return map on v = 0 (`loop_cycles`). The points at which branches begin and
-end are bracketed much closer than the values are (`loop_ends`).
+the limit cycles from the return map on v = 0 (`loop_cycles`). A branch of cycles ends where the return map
+jumps, and of a cycle without the loop's symmetry its mirror image is a branch of its own. The points at which
+branches begin, end and change are refined (`cycle_changes`).
 
 Amplitude is max|x1| over a period, everywhere.
 """
@@ -18,8 +19,9 @@ from numpy.typing import ArrayLike
 
 from compensation.closed_loop import ClosedLoop, simulate
 from compensation.controller import Gains
-from compensation.loop_cycles import distance, stable_cycles
-from compensation.loop_ends import last_cycle
+from compensation.cycle_chains import Chain, chained
+from compensation.cycle_changes import changes_of_cycles, cut_at_jumps
+from compensation.loop_cycles import stable_cycles
 from compensation.loop_section import LoopSection, with_gain
 from compensation.loop_tables import Parameter
 from compensation.orbits.periodic_orbits import Cycle, find_cycle
@@ -38,7 +40,6 @@ from ident.simulation.filippov_system import FloatArray
 Kind = Literal["equilibrium_set", "equilibrium", "limit_cycle"]
 
 ONE_CHANGE: Final = 1e-9  # relative distance at which two changes are one
-CONTINUOUS: Final = 0.25  # amplitude at an onset, relative to the next point, below which it grows from zero
 SAMPLES: Final = 4000  # of a trajectory that is classified by its samples
 
 
@@ -95,12 +96,15 @@ def diagram(loop: ClosedLoop, parameter: Parameter, values: ArrayLike) -> Diagra
     if grid.ndim != 1 or grid.size == 0 or not np.all(np.isfinite(grid)) or np.any(np.diff(grid) <= 0):
         raise ModelError(f"values of {parameter} must be finite and ascending")
     with_gain(loop, parameter, float(grid[0]))  # refuses what is no gain
-    chains = chained(stable_cycles(loop, parameter, grid))
+    chains = cut_at_jumps(loop, parameter, grid, chained(stable_cycles(loop, parameter, grid)))
     cycles = [_cycle_branch(chain, grid) for chain in chains]
     pieces = rest_pieces(loop, parameter, grid)
     changes = list(_changes_of_equilibria(loop, parameter, grid, pieces))
-    suspects = [change.value for change in changes]
-    bifurcations = [*changes, *_ends_of_cycles(loop, parameter, grid, chains, suspects)]
+    births = [change.value for change in changes]
+    bifurcations = [
+        *changes,
+        *(Bifurcation(c.value, c.kind) for c in changes_of_cycles(loop, parameter, grid, chains, births)),
+    ]
     return Diagram(
         parameter=parameter,
         gains=loop.controller.gains,
@@ -136,33 +140,6 @@ def _is_on(cycle: Cycle, extremes: Sequence[float]) -> bool:
     return all(cycle.x1_min - slack <= x1 <= cycle.x1_max + slack for x1 in extremes)
 
 
-@dataclass(frozen=True)
-class Chain:
-    """A branch of cycles over consecutive values of the grid."""
-
-    first: int  # index of the first value
-    cycles: list[Cycle]
-
-    @property
-    def last(self) -> int:
-        """Index of the last value."""
-        return self.first + len(self.cycles) - 1
-
-
-def chained(found: Sequence[Sequence[Cycle]]) -> list[Chain]:
-    """Cycles at consecutive values, joined to branches: each branch goes on with the nearest cycle left."""
-    chains: list[Chain] = []
-    for index, cycles in enumerate(found):
-        free = list(cycles)
-        for chain in [chain for chain in chains if chain.last == index - 1]:
-            if free:
-                last = chain.cycles[-1]
-                distances = [distance(cycle, last) for cycle in free]
-                chain.cycles.append(free.pop(distances.index(min(distances))))
-        chains.extend(Chain(index, [cycle]) for cycle in free)
-    return chains
-
-
 def _cycle_branch(chain: Chain, grid: FloatArray) -> Branch:
     values = grid[chain.first : chain.last + 1]
     points = [
@@ -170,29 +147,6 @@ def _cycle_branch(chain: Chain, grid: FloatArray) -> Branch:
         for value, c in zip(values, chain.cycles, strict=True)
     ]
     return Branch("limit_cycle", True, tuple(points))
-
-
-def _ends_of_cycles(
-    loop: ClosedLoop,
-    parameter: Parameter,
-    grid: FloatArray,
-    chains: Sequence[Chain],
-    suspects: Sequence[float],
-) -> Iterator[Bifurcation]:
-    """Where branches of cycles begin or end inside the grid; `suspects` are looked at first."""
-    for chain in chains:
-        for inner, outer in ((chain.first, chain.first - 1), (chain.last, chain.last + 1)):
-            if not 0 <= outer < grid.size:
-                continue
-            begins = outer < inner
-            cycle = chain.cycles[0 if begins else -1]
-            interval = (float(grid[inner]), float(grid[outer]))
-            last = last_cycle(loop, parameter, interval, cycle, suspects)
-            small = last.cycle.amplitude < CONTINUOUS * cycle.amplitude
-            word = "appears" if begins else "vanishes"
-            yield Bifurcation(
-                last.value, f"limit cycle {word}, {'from zero amplitude' if small else 'with a jump'}"
-            )
 
 
 def _equilibrium_branches(grid: FloatArray, pieces: Pieces) -> list[Branch]:

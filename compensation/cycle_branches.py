@@ -13,6 +13,7 @@ named by the event that appears; what the motion settles on beyond it begins a b
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -24,6 +25,7 @@ import numpy as np
 from compensation.closed_loop import ClosedLoop
 from compensation.cycle_ends import CycleEvent, Neighbourhood, crossing, end_of
 from compensation.cycle_modes import Stick, events_of, mode_sequence, stick_phases
+from compensation.loop_cycles import distance, mirrored
 from compensation.loop_section import GAIN_NAMES, LoopSection, with_gain
 from compensation.orbits.continuation import Curve, CurveEvent, Steps, trace
 from compensation.orbits.cycle_equation import JOINED, CycleEquation
@@ -37,7 +39,7 @@ Gain = Literal["r", "L", "n1", "n2"]
 STARTS: Final = (0.6, -0.6, 0.1, -0.1)  # x1(0) [rad] from which the first cycle is looked for
 VANISHED: Final = 1e-5  # [rad] extent of a cycle that has become a point
 MOST_BRANCHES: Final = 12
-SAME: Final = 0.02  # of its extent: so near to a known branch, a cycle is on it
+SAME: Final = 1e-3  # relative difference of extremes and period: so near to a known branch, a cycle is on it
 BARELY: Final = 1e-9  # relative difference of gains that are one
 KINDS: Final = {"fold": "fold of cycles", "label": "mode sequence"}
 
@@ -78,7 +80,8 @@ def cycle_branches(
     Raises
     ------
     ModelError
-        If the gain is unknown, the span is empty, or the loop's own gain lies outside it.
+        If the gain is unknown, the span is empty, reaches beyond what a gain may be (eqs 5-7), or does not
+        hold the loop's own gain.
     """
     value = _checked(loop, gain, span)
     section = LoopSection(loop)
@@ -127,7 +130,13 @@ def _checked(loop: ClosedLoop, gain: Gain, span: tuple[float, float]) -> float:
     if gain not in GAIN_NAMES:
         raise ModelError(f"gain is {gain!r}: branches are drawn over 'r', 'L', 'n1' or 'n2' (eqs 5-7)")
     value = float(getattr(loop.controller.gains, GAIN_NAMES[gain]))
-    if not span[0] <= value <= span[1] or not span[0] < span[1]:
+    low, high = span
+    if not (math.isfinite(low) and math.isfinite(high)):
+        raise ModelError(f"span of {gain} is {span}: a gain is a finite number (eqs 5-7)")
+    if low < 0.0 or (gain == "n1" and low == 0.0):
+        least = "n1 > 0, or no position is a set point (eq 5)" if gain == "n1" else "a gain is >= 0 (eqs 5-7)"
+        raise ModelError(f"span of {gain} is {span}: {least}")
+    if not low <= value <= high or not low < high:
         raise ModelError(f"span of {gain} is {span}: an ascending pair around the loop's own {value:g}")
     return value
 
@@ -187,8 +196,6 @@ def _is_on(cycle: Cycle, value: float, section: LoopSection, branch: CycleBranch
     """Whether a branch is known to pass through a cycle."""
     if branch.returns != cycle.returns:
         return False
-    visited = section.follow(cycle.point, cycle.returns).points
-    near = SAME * (cycle.x1_max - cycle.x1_min)
     for before, after in pairwise((branch.points[0], *branch.points, branch.points[-1])):
         low, high = sorted((before.value, after.value))
         slack = BARELY * abs(value)
@@ -196,10 +203,26 @@ def _is_on(cycle: Cycle, value: float, section: LoopSection, branch: CycleBranch
             share = (value - before.value) / (after.value - before.value) if high > low else 0.0
             guess = before.cycle.point + share * (after.cycle.point - before.cycle.point)
             there = shoot(section, guess, branch.returns)
-            at = there.point if isinstance(there, Cycle) else guess
-            if float(np.min(np.max(np.abs(visited - at), axis=1))) <= near:
+            if (
+                isinstance(there, Cycle)
+                and _is_between(there, before.cycle, after.cycle, section)
+                and _apart(cycle, there, section) <= SAME
+            ):
                 return True
     return False
+
+
+def _is_between(cycle: Cycle, before: Cycle, after: Cycle, section: LoopSection) -> bool:
+    """Whether a cycle goes on from one to the other: shooting may have found one across a jump."""
+    room = _apart(before, after, section) + SAME
+    return max(_apart(cycle, before, section), _apart(cycle, after, section)) <= room
+
+
+def _apart(one: Cycle, other: Cycle, section: LoopSection) -> float:
+    """Relative difference of two cycles; a mirror image in a symmetric loop is the same."""
+    if not section.symmetric:
+        return distance(one, other)
+    return min(distance(one, other), distance(one, mirrored(other, section)))
 
 
 def _named(event: CurveEvent) -> CycleEvent:

@@ -7,13 +7,14 @@ symmetric and what follows is not, that breaks the symmetry, whatever its multip
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
 from compensation.cycle_modes import events_of, parting
+from compensation.loop_cycles import distance
 from compensation.loop_section import PATIENCE, LoopSection
 from compensation.orbits.continuation import Curve, CurveEvent, other_branch
 from compensation.orbits.cycle_equation import JOINED, MET_EQUILIBRIUM, CycleEquation
@@ -23,6 +24,8 @@ from ident.simulation.filippov_system import FloatArray
 
 BEYOND: Final = (1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3)  # [scaled] how far beyond an end to look
 BRANCH_OFF: Final = (1e-3, 1e-4)  # [scaled] distances at which a branch that crosses is looked for
+ANOTHER: Final = 0.01  # relative difference of extremes or period of cycles that do not continue each other
+STRAYED: Final = (1e-5, 1e-3)  # [scaled] distances at which motion that has lost its cycle is looked for
 RANGE: Final = "end of the parameter's range"
 RESTS: Final = "meets an equilibrium: the link comes to rest on the way"
 TOO_LONG: Final = f"a return takes more than {PATIENCE:g} s"
@@ -66,14 +69,18 @@ class Neighbourhood:
 def end_of(around: Neighbourhood, curve: Curve) -> tuple[CycleEvent, list[tuple[float, Cycle]]]:
     """The last event of a curve, and cycles by their gain which the motion settles on beyond."""
     last = curve.points[-1]
-    if curve.end_reason == RANGE or curve.end_reason.startswith("limit"):
-        return CycleEvent("end", last.p, curve.end_reason), []
+    if curve.end_reason == RANGE:
+        return CycleEvent("end", last.p, RANGE), []
     if curve.end_reason == MET_EQUILIBRIUM:
         return CycleEvent("end", _vanishing(around.equation, curve), MET_EQUILIBRIUM), []
     if curve.end_reason == JOINED:
         at = curve.events[-1] if curve.events else last
         return CycleEvent("end", at.p, JOINED), []
     beyond = _beyond(around, last)
+    if curve.end_reason.startswith(
+        "limit"
+    ):  # where an unstable branch is too stiff to follow, motion leaves it
+        return CycleEvent("end", last.p, curve.end_reason), beyond
     if curve.end_reason in LOSSES:
         return CycleEvent("end", last.p, LOSSES[curve.end_reason]), beyond
     graze = _graze(around, last)
@@ -84,20 +91,29 @@ def end_of(around: Neighbourhood, curve: Curve) -> tuple[CycleEvent, list[tuple[
 
 
 def crossing(around: Neighbourhood, event: CurveEvent) -> list[tuple[float, Cycle]]:
-    """Cycles by their gain on the branches that cross or branch off at an event."""
+    """Cycles by their gain that cross or branch off at an event, or else that are settled on nearby."""
+    if event.kind == "label":
+        return []
     equation = around.equation
     if event.kind in (SYMMETRY_BREAKING, "period doubling"):
         equation = replace(equation, returns=2 * equation.returns)
-    elif event.kind != "branch point":
-        return []
     for length in BRANCH_OFF:
-        sides = other_branch(equation, event, scale=around.scale, length=length)
+        sides = other_branch(equation, event, scale=around.scale, length=length) if _branches(event) else ()
         inside = [point for point in sides if around.span[0] <= point.p <= around.span[1]]
         found = [(point.p, cycle_at(around.section(point.p), point.x, equation.returns)) for point in inside]
         cycles = [(value, cycle) for value, cycle in found if isinstance(cycle, Cycle)]
         if cycles:
             return cycles
-    return []
+    places = [
+        (event.x, float(event.p + side * around.scale[-1]))
+        for length in STRAYED
+        for side in (-length, length)
+    ]
+    return list(_settled(around, places))
+
+
+def _branches(event: CurveEvent) -> bool:
+    return event.kind in (SYMMETRY_BREAKING, "period doubling", "branch point")
 
 
 def _vanishing(equation: CycleEquation, curve: Curve) -> float:
@@ -108,22 +124,45 @@ def _vanishing(equation: CycleEquation, curve: Curve) -> float:
 
 
 def _beyond(around: Neighbourhood, last: CurvePoint) -> list[tuple[float, Cycle]]:
-    """What the motion settles on where the branch is no more: the nearest cycle of each number of returns."""
-    found: dict[int, tuple[float, Cycle]] = {}
-    for distance in BEYOND:
-        point, gain = around.ahead(last, distance)
-        if not around.span[0] <= gain <= around.span[1]:
-            continue
-        cycle = find_cycle(around.section(gain), point)
-        if isinstance(cycle, Cycle) and cycle.returns not in found:
-            other = cycle.returns != around.equation.returns or _apart(cycle, last, around.equation)
-            if other:
-                found[cycle.returns] = (gain, cycle)
-    return list(found.values())
+    """What the motion settles on where the branch is no more, by number of returns: the nearest and farthest.
+
+    The nearest cycle may itself be too near its own graze to be followed. The gain alone is moved on, too:
+    along the tangent it hardly changes where a branch runs into a graze steeply.
+    """
+    here = cycle_at(around.section(last.p), last.x, around.equation.returns)
+    onward = np.sign(last.tangent[-1]) * around.scale[-1]
+    places = [
+        place
+        for length in BEYOND
+        for place in (around.ahead(last, length), (last.x, float(last.p + length * onward)))
+    ]
+    nearest: dict[int, tuple[float, Cycle]] = {}
+    farthest: dict[int, tuple[float, Cycle]] = {}
+    for gain, cycle in _settled(around, places):
+        if not isinstance(here, Cycle) or _is_another(around, (gain, cycle), (last.label, here)):
+            nearest.setdefault(cycle.returns, (gain, cycle))
+            farthest[cycle.returns] = (gain, cycle)
+    return [*nearest.values(), *farthest.values()]
 
 
-def _apart(cycle: Cycle, last: CurvePoint, equation: CycleEquation) -> bool:
-    return float(np.max(np.abs(cycle.point - last.x))) > 1e-2 * equation.size(last.x, last.p)
+def _settled(
+    around: Neighbourhood, places: Iterable[tuple[FloatArray, float]]
+) -> Iterator[tuple[float, Cycle]]:
+    """The cycles, by their gain, that the motion settles on from points (2,) at gains within the span."""
+    for point, gain in places:
+        if around.span[0] <= gain <= around.span[1]:
+            cycle = find_cycle(around.section(gain), point)
+            if isinstance(cycle, Cycle):
+                yield gain, cycle
+
+
+def _is_another(around: Neighbourhood, beyond: tuple[float, Cycle], last: tuple[str, Cycle]) -> bool:
+    """Whether a cycle beyond an end does not continue the last one, in returns, modes, extent or period."""
+    gain, cycle = beyond
+    label, here = last
+    if cycle.returns != here.returns or distance(cycle, here) > ANOTHER:
+        return True
+    return around.equation.label(cycle.point, gain) != label
 
 
 def _graze(around: Neighbourhood, last: CurvePoint) -> str | None:
@@ -131,8 +170,8 @@ def _graze(around: Neighbourhood, last: CurvePoint) -> str | None:
     returns = around.equation.returns
     duration = float(np.sum(around.section(last.p).follow(last.x, returns).durations))
     here = events_of(around.section(last.p).loop, last.x, duration)
-    for distance in BEYOND:
-        point, gain = around.ahead(last, distance)
+    for length in BEYOND:
+        point, gain = around.ahead(last, length)
         found = parting(here, events_of(around.section(gain).loop, point, duration), duration)
         if found is not None:
             return found

@@ -1,20 +1,22 @@
 """The stable limit cycles of a closed loop at every value of a gain.
 
 Cycles are followed upwards from value to value, beside new starts on both sides and far and near, and then
-downwards from what was found: attractors that coexist are found too. A symmetric loop is swept by a kernel
+downwards from what was found: attractors that coexist are found too. A cycle of a symmetric loop that is not
+symmetric itself has a mirror image, and both are given. A symmetric loop is swept by a kernel
 (`loop_sweep`); what that leaves undecided, and asymmetric loops, are searched value by value.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from compensation.closed_loop import ClosedLoop
 from compensation.loop_returns import map_kernels
-from compensation.loop_section import PATIENCE, TOLERANCE, LoopSection
+from compensation.loop_section import PATIENCE, TOLERANCE, LoopSection, with_gain
 from compensation.loop_settling import settled
 from compensation.loop_sweep import COLUMNS, FOUND, HALF_PERIOD, SLOPE, UNDECIDED, sweep
 from compensation.loop_tables import Parameter, tables_over
@@ -34,16 +36,22 @@ def stable_cycles(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> l
         if first.symmetric and first.by_series
         else _searched(loop, parameter, grid)
     )
+    same = _same(first)
     for index in range(grid.size - 2, -1, -1):
+        here = found[index]
         for cycle in found[index + 1]:
-            if len(found[index]) < len(found[index + 1]):
-                _add(found[index], cycle_near(loop, parameter, float(grid[index]), cycle), _same(first))
+            if len(here) < len(found[index + 1]) or all(cycle.returns != one.returns for one in here):
+                _add(here, cycle_near(loop, parameter, float(grid[index]), cycle), same)
     return found
 
 
 def cycle_near(loop: ClosedLoop, parameter: Parameter, value: float, cycle: Cycle) -> Cycle | NoCycle:
     """The cycle at a value of the gain to which another value's cycle leads."""
-    return settled(loop, parameter, value, cycle.point)
+    found = settled(loop, parameter, value, cycle.point)
+    section = LoopSection(with_gain(loop, parameter, value))
+    if isinstance(found, Cycle) and _has_mirror(found, section):
+        return min(found, mirrored(found, section), key=lambda one: distance(one, cycle))
+    return found
 
 
 def distance(one: Cycle, other: Cycle) -> float:
@@ -51,6 +59,12 @@ def distance(one: Cycle, other: Cycle) -> float:
     size = max(one.amplitude, other.amplitude)
     extremes = max(abs(one.x1_min - other.x1_min), abs(one.x1_max - other.x1_max)) / size
     return max(extremes, abs(one.period - other.period) / max(one.period, other.period))
+
+
+def mirrored(cycle: Cycle, section: LoopSection) -> Cycle:
+    """The mirror image of an asymmetric cycle of a symmetric loop: in its map, the other half turn."""
+    (point,) = section.follow(cycle.point, 1).points
+    return replace(cycle, point=point, x1_min=-cycle.x1_max, x1_max=-cycle.x1_min)
 
 
 def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, cold: FloatArray) -> list[list[Cycle]]:
@@ -64,7 +78,9 @@ def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, cold: Float
             found.extend(_decided(grid[here:], tables[here:], _start(found, cold), cold))
         if len(found) < grid.size:
             known: list[Cycle] = []
-            _add(known, settled(loop, parameter, float(grid[len(found)]), _start(found, cold)), same)
+            value = float(grid[len(found)])
+            cycle = settled(loop, parameter, value, _start(found, cold))
+            _add_with_mirror(known, cycle, LoopSection(with_gain(loop, parameter, value)), same)
             found.append(known)
     return found
 
@@ -112,16 +128,30 @@ def _searched(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> list[
     found: list[list[Cycle]] = []
     for value in grid.tolist():
         warm = [cycle.point for cycle in found[-1]] if found else []
+        at = LoopSection(with_gain(loop, parameter, value))
         known: list[Cycle] = []
         for point in warm if symmetric and warm else [*warm, *cold]:
-            _add(known, settled(loop, parameter, value, point), same)
+            _add_with_mirror(known, settled(loop, parameter, value, point), at, same)
         found.append(known)
     return found
+
+
+def _has_mirror(cycle: Cycle, section: LoopSection) -> bool:
+    """Whether the loop is symmetric and the cycle is not."""
+    return section.symmetric and cycle.returns % 2 == 0
 
 
 def _same(section: LoopSection) -> float:
     """Relative difference of two cycles that are one."""
     return max(SAME_CYCLE, SAME_POINTS * section.accuracy)
+
+
+def _add_with_mirror(
+    known: list[Cycle], candidate: Cycle | NoCycle, section: LoopSection, same: float
+) -> None:
+    _add(known, candidate, same)
+    if isinstance(candidate, Cycle) and _has_mirror(candidate, section):
+        _add(known, mirrored(candidate, section), same)
 
 
 def _add(known: list[Cycle], candidate: Cycle | NoCycle, same: float) -> None:

@@ -19,40 +19,41 @@ FINE: Final = 2.0**-20  # of an interval, to which an end is found
 
 
 @dataclass(frozen=True)
-class LastCycle:
-    """The cycle nearest to the end of its branch."""
+class CycleAt:
+    """A stable cycle on the way to the end of its branch."""
 
     value: float  # of the gain: r [-] or L [1/s]
     cycle: Cycle
 
 
-def last_cycle(
+def towards_the_end(
     loop: ClosedLoop,
     parameter: Parameter,
     interval: tuple[float, float],
     cycle: Cycle,
     suspects: Iterable[float],
-) -> LastCycle:
-    """The last cycle in an interval from a value with `cycle` to one where that leads to none.
+) -> list[CycleAt]:
+    """The cycles on the way from a value with `cycle` to one where that leads to none, nearest last.
 
     `suspects` are values at which the branch may end.
     """
     inside, outside = interval
     fine = FINE * abs(outside - inside)
     probes = _probes(interval, suspects)
-    last = LastCycle(inside, cycle)
-    while abs(outside - last.value) > fine:
+    passed = [CycleAt(inside, cycle)]
+    while abs(outside - passed[-1].value) > fine:
         probe = next(probes, None)
+        last = passed[-1]
         value = 0.5 * (last.value + outside) if probe is None else probe
         if min(last.value, outside) < value < max(last.value, outside):
             found = settled(loop, parameter, value, last.cycle.point)
             if isinstance(found, Cycle) and found.stable:
-                last = LastCycle(value, found)
+                passed.append(CycleAt(value, found))
             else:
                 outside = value
         elif probe is None:
             break  # between neighbouring numbers there is nothing
-    return last
+    return passed
 
 
 def _probes(interval: tuple[float, float], suspects: Iterable[float]) -> Iterator[float]:

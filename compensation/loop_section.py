@@ -78,13 +78,13 @@ class LoopSection:
             run_for(parameters), parameters, self.symmetric, self.tolerance, PATIENCE, state, rows
         )
         still = rows[:made, 4] - rows[:made, 3] <= STILL * np.abs(rows[:made, 0])
-        if still.any():
+        if still.any():  # at the edge of an equilibrium set
             made, reason = int(np.argmax(still)), EQUILIBRIUM
         rows = rows[:made]
         return Returns(rows[:, :2], rows[:, 2], rows[:, 3], rows[:, 4], END_REASONS[reason])
 
     def derivative(self, point: FloatArray) -> FloatArray | None:
-        """Derivative (2, 2) of one return from a point (2,), None where it grazes a surface.
+        """Derivative (2, 2) of one return from a point (2,), None where the motion rests or grazes.
 
         By deviations carried along, or by differences where a law is not Lipschitz: there the coefficients of
         the deviations' equation are unbounded near x2 = 0.
@@ -107,7 +107,7 @@ class LoopSection:
             before = state[0]
             once = np.empty((3, 2))
             _, reason = derivative(run, carried, self._parameters, *accuracy, state, once)
-            if reason != SECTION or not np.all(np.isfinite(once)):
+            if reason != SECTION or not np.all(np.isfinite(once)):  # a link at rest slips on by rounding
                 return None
             slope = once[:2] @ slope
             if self.symmetric:

@@ -7,6 +7,9 @@
 - `decay_rate`: `observer_error` (L minus the worst critical gain of the robot as it moves; below 0 errors
   grow) and `loop` (without observer error), the same fields;
 - `overcompensation_threshold`: by compensator and direction the largest r that overcompensates nowhere;
+- `rests_beside_the_cycle`: `positive`, `negative` (direction of the velocity estimate) and `r_max`, the
+  larger, the same fields: the largest r at which the link can still rest off the set point at the chosen L.
+  Where it can cycle at such an r, too, its start decides between the two (`compensation.coexistence`);
 - `equilibrium_sets`: for r = 0, r = 1 and the chosen r at the chosen L: `{"r", "observer_gain", "x1_min",
   "x1_max", "single_point", "segments"}`;
 - `certificates`: `{"robot", "law", "hypothesis", "holds", "margin", "unit", "says"}`, for the
@@ -17,8 +20,8 @@
 - `gains`, `law`, `compensator`, `draws`, `seed`, `withheld`: what was asked, and what could not be answered.
 
 A campaign without set-point runs tells no gains of the loop, and `run` still designs what needs none: `gains`
-is null then, `decay_rate` is withheld, `equilibrium_sets` and `certificates` are empty, and `withheld` says
-why; the critical gains, the thresholds and the recommendation stand.
+is null then, `decay_rate` and `rests_beside_the_cycle` are withheld, `equilibrium_sets` and `certificates`
+are empty, and `withheld` says why; the critical gains, the thresholds and the recommendation stand.
 
 Intervals are 2.5 and 97.5 % quantiles over robots drawn from the fit's joint normal distribution. The
 published robot has none: its intervals are null. It moves with the mean of Table 1's columns, and both
@@ -41,11 +44,13 @@ from ident.model import published
 from ident.model.robot import OneLinkRobot
 from pipelines.design_quantities import (
     RATES,
+    RESTS,
     Quantity,
     critical_gains,
     critical_gains_of_known_directions,
     decay_rates,
     drawn_robots,
+    rests_beside_the_cycle,
     threshold_ends,
     threshold_values,
 )
@@ -69,6 +74,7 @@ class Design:
     compensator: str
     critical: Mapping[str, Quantity]
     decay: Mapping[str, Quantity]
+    coexistence: Mapping[str, Quantity]
     thresholds: Mapping[str, Mapping[str, float | None]]
     rests: tuple[tuple[float, EquilibriumSet], ...]  # (r, set)
     certificates: tuple[tuple[str, Certificate], ...]  # (robot, certificate)
@@ -107,6 +113,7 @@ def design(
         compensator=_compensator_name(source, compensator),
         critical=critical_gains_of_known_directions(source),
         decay={name: Quantity(None, "1/s", withheld="; ".join(source.missing())) for name in RATES},
+        coexistence={name: Quantity(None, "1", withheld="; ".join(source.missing())) for name in RESTS},
         thresholds={},
         rests=(),
         certificates=(),
@@ -130,6 +137,7 @@ def design(
         nothing,
         critical=critical,
         decay={name: Quantity(None, "1/s", withheld=without_gains) for name in RATES},
+        coexistence={name: Quantity(None, "1", withheld=without_gains) for name in RESTS},
         thresholds=threshold_values(robot),
         advice=recommend(
             robot,
@@ -145,9 +153,11 @@ def design(
     if gains is None:
         return replace(unpaced, withheld=(*nothing.withheld, without_gains))
     controller = Controller(gains, model)
+    moved = [one.mean() if law == "mean" else one for one in drawn]
     return replace(
         unpaced,
-        decay=decay_rates(moving, controller, [one.mean() if law == "mean" else one for one in drawn]),
+        decay=decay_rates(moving, controller, moved),
+        coexistence=rests_beside_the_cycle(moving, controller, moved),
         rests=tuple(
             (r, equilibrium_set(moving, Controller(replace(gains, compensation=r), model)))
             for r in sorted({0.0, 1.0, gains.compensation})
@@ -229,6 +239,7 @@ def _document(result: Design) -> dict[str, object]:
         "compensator": result.compensator,
         "critical_observer_gain": result.critical,
         "decay_rate": result.decay,
+        "rests_beside_the_cycle": result.coexistence,
         "overcompensation_threshold": result.thresholds,
         "equilibrium_sets": [
             _rest_document(r, found, result.gains) for r, found in result.rests if result.gains is not None

@@ -13,6 +13,7 @@ from typing import Final
 
 import numpy as np
 
+from compensation.coexistence import largest_compensation_with_rest
 from compensation.controller import Controller
 from compensation.design_criteria import (
     critical_observer_gain,
@@ -27,6 +28,7 @@ from ident.model.robot import OneLinkRobot
 from pipelines.results.robot_file import RobotFile
 
 CRITICAL_GAINS: Final = ("positive", "negative", "mean", "worst")
+RESTS: Final = ("positive", "negative", "r_max")
 RATES: Final = ("observer_error", "loop")
 
 
@@ -99,6 +101,27 @@ def decay_rates(
         else Quantity(rate, "1/s", interval95=_interval([observer_error_decay(one, L) for one in drawn]))
     )
     return {"observer_error": error, "loop": Quantity(loop_decay(controller).rate, "1/s")}
+
+
+def rests_beside_the_cycle(
+    moving: OneLinkRobot, controller: Controller, drawn: list[OneLinkRobot]
+) -> dict[str, Quantity]:
+    """r_max of each direction of the estimate, and of both: the largest r with a rest off the set point."""
+    found = _largest_rests(moving, controller)
+    samples = [_largest_rests(one, controller) for one in drawn]
+    return {
+        name: Quantity(r, "1", interval95=_interval([sample[name] for sample in samples]))
+        if math.isfinite(r)
+        else Quantity(
+            None, "1", withheld="nothing is compensated: the link can rest off the set point at any r"
+        )
+        for name, r in found.items()
+    }
+
+
+def _largest_rests(moving: OneLinkRobot, controller: Controller) -> dict[str, float]:
+    found = largest_compensation_with_rest(moving, controller)
+    return {"positive": found.positive.r, "negative": found.negative.r, "r_max": found.r_max}
 
 
 def threshold_values(robot: OneLinkRobot) -> dict[str, dict[str, float | None]]:

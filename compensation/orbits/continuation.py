@@ -39,6 +39,7 @@ BISECTIONS: Final = 60
 LOCATED: Final = 1e-12  # of the step in which an event is
 CROSSED: Final = 0.1  # of the rank's measure nearby: so much is left of it at a branch point
 FLAT: Final = 1e-3  # a tangent's part along p below which the way to a value of p is no guide
+LEAP: Final = 0.005  # of the problem's size, that a step may change x against the tangents
 STRANGE: Final = 0.1  # relative change of a companion in one step
 JUMP: Final = 1e3  # steps by which F misses zero where a solution jumps
 
@@ -194,9 +195,25 @@ def _step(
         return after
     if float(after.tangent @ before.tangent) < SHARPEST:
         return Lost("the curve turns too sharply")
+    if _leaps(scaled, before, after):
+        return Lost("the solution found does not continue the curve")
     if np.any(np.abs(after.companions - before.companions) > STRANGE * before.companions):
         return Lost("the solution found is another one")
     return after
+
+
+def _leaps(scaled: Scaled, before: CurvePoint, after: CurvePoint) -> bool:
+    """Whether x changes by more than the tangents at both ends of a step can account for.
+
+    Along a curve the chord lies between the tangents.
+    """
+    chord = scaled.join(after.x, after.p) - scaled.join(before.x, before.p)
+    length = float(np.linalg.norm(chord))
+    middle = 0.5 * (before.tangent + after.tangent)
+    turned = 0.5 * np.abs(after.tangent - before.tangent)
+    beyond = np.abs(chord - length * middle) - length * turned
+    size = scaled.problem.size(before.x, before.p)
+    return bool(np.max(beyond[:-1] * scaled.scale[:-1]) > LEAP * size)
 
 
 def _events_between(scaled: Scaled, before: CurvePoint, after: CurvePoint) -> list[CurveEvent]:

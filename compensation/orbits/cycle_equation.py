@@ -20,6 +20,7 @@ from compensation.orbits.solution_curve import Lost
 from ident.simulation.filippov_system import FloatArray
 
 DIFFERENCE: Final = 1e-9  # of the parameter, relative
+SCARCE: Final = 0.1  # of the parameter's range: a parameter below it is as good as 0
 JUMPED: Final = 10.0  # ratio of the two one-sided differences
 ROUNDING: Final = 1e-14
 SAME: Final = 2e-5  # of its extent: so near points of a cycle are one
@@ -39,7 +40,8 @@ class CycleEquation:
 
     def residual(self, x: FloatArray, p: float) -> FloatArray | Lost:
         """P^k(x) - x, (d,)."""
-        if not self.span[0] * (1.0 - ROUNDING) <= p <= self.span[1] * (1.0 + ROUNDING):
+        slack = ROUNDING * self.span[1]
+        if not self.span[0] - slack <= p <= self.span[1] + slack:
             return Lost("the parameter is out of its range")
         done = self.family(p).follow(x, self.returns)
         return done.points[-1] - x if done.end_reason == "section reached" else Lost(done.end_reason)
@@ -55,7 +57,7 @@ class CycleEquation:
         return np.column_stack([slope - np.eye(x.size), self._by_parameter(x, p, here)])
 
     def _by_parameter(self, x: FloatArray, p: float, here: FloatArray) -> FloatArray:
-        step = DIFFERENCE * max(abs(p), DIFFERENCE)
+        step = DIFFERENCE * max(abs(p), SCARCE * (self.span[1] - self.span[0]))
         quotients = []
         for at in (p + step, p - step):
             there = self.residual(x, at)

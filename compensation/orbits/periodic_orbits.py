@@ -25,7 +25,8 @@ from ident.simulation.filippov_system import FloatArray
 MOST_TURNS: Final = 6  # returns a cycle may take
 PATIENCE: Final = 240  # returns to follow before giving up
 FIRST_LOOK: Final = 3
-LATER_LOOKS: Final = 24
+SHOOTING: Final = 12  # returns after which following is dearer than shooting
+LONGEST_LOOK: Final = 24  # each look is as long as all before, up to this
 NEWTON_STEPS: Final = 12
 SAME_POINT: Final = 1e-7  # relative distance of points of a converged cycle that are one
 VANISHED: Final = 1e-9  # of the start: what has become as small decays
@@ -102,11 +103,11 @@ def find_cycle(section: ReturnMap, start: FloatArray) -> Cycle | NoCycle:
         if points.shape[0] >= PATIENCE:
             return NoCycle(f"no repetition within {points.shape[0]} returns")
         returns = _repeats(points, NEAR)
-        if returns and points.shape[0] > FIRST_LOOK:
+        if returns and points.shape[0] >= SHOOTING:
             shot = shoot(section, points[-1], returns)
             if isinstance(shot, Cycle) and shot.stable:
                 return shot
-        done = section.follow(points[-1], LATER_LOOKS)
+        done = section.follow(points[-1], min(points.shape[0], LONGEST_LOOK))
         points = np.concatenate([points, done.points])
 
 

@@ -7,6 +7,10 @@ the gains that stay (`observer_gain`, ...; the swept one is null), `branches` of
 `equilibrium` (the isolated set point) and `limit_cycle`. Amplitude is max|x1| over a period; a complex
 multiplier is `[re, im]`.
 
+A branch of cycles ends where the cycle jumps; of cycles without the symmetry of their loop both mirror
+images are branches. The kind of a bifurcation begins with `equilibria change`, `limit cycle appears`, `limit
+cycle vanishes`, `limit cycle jumps`, `symmetry breaking`, `period doubling` or `mode sequence`.
+
 `diagram.csv`: a row a point, with the parameter, the branch's number, kind and stability, x1_min, x1_max,
 amplitude, period.
 """

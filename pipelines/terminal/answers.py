@@ -11,12 +11,19 @@ SHOWN: Final = 12  # withheld things that are listed; the rest is counted
 
 
 def design(document: Mapping[str, Any]) -> list[str]:
-    """Critical gains and the recommendation."""
+    """Critical gains, the rests that coexist with the cycle, and the recommendation."""
     lines = ["critical observer gain L_c [1/s]"]
     for name, entry in document["critical_observer_gain"].items():
         lines.append(f"  {name:<9} {_number(entry['value'], 'withheld')}{_interval(entry.get('interval95'))}")
         if entry["value"] is None:
             lines[-1] += f" ({entry['withheld']})"
+    largest = document["rests_beside_the_cycle"]["r_max"]
+    if largest["value"] is not None:
+        lines.append(
+            "rests off the set point, beside any limit cycle, up to "
+            f"r = {largest['value']:.5g}{_interval(largest['interval95'])} "
+            f"at L = {document['gains']['observer']:.4g} 1/s"
+        )
     advice = document["recommended"]
     if advice["observer_gain"] is not None:
         lines.append(

@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
-from compensation.bifurcation import Branch, Diagram, chained, diagram, where_it_ends
+from compensation.bifurcation import Branch, Diagram, diagram, where_it_ends
 from compensation.closed_loop import ClosedLoop
 from compensation.coexistence import largest_compensation_with_rest
 from compensation.controller import Controller, Gains
-from compensation.orbits.periodic_orbits import Cycle
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
@@ -53,15 +52,54 @@ def test_below_the_critical_gain_the_cycle_jumps_and_equilibria_coexist() -> Non
 
 def test_asymmetric_robot_cycles_before_r_1_beside_its_equilibria() -> None:
     drawn = diagram(loop(robot=asymmetric_robot()), "r", np.linspace(0.98, 1.1, 13))
-    (cycle,) = branches(drawn, "limit_cycle")
-    assert 0.99 < cycle.points[0].value <= 1.0
+    cycles = branches(drawn, "limit_cycle")
+    assert 0.99 < cycles[0].points[0].value <= 1.0
     rests = branches(drawn, "equilibrium_set")
     assert any(point.value > 1.0 for branch in rests for point in branch.points)
-    assert all(abs(point.x1_min + point.x1_max) > 1e-4 for point in cycle.points)
-    assert all(point.amplitude == max(-point.x1_min, point.x1_max) for point in cycle.points)
+    points = [point for cycle in cycles for point in cycle.points]
+    assert all(abs(point.x1_min + point.x1_max) > 1e-4 for point in points)
+    assert all(point.amplitude == max(-point.x1_min, point.x1_max) for point in points)
     assert next(b for b in drawn.bifurcations if "equilibria" in b.kind).value == pytest.approx(
         1.0564, abs=1e-4
     )
+
+
+def changes(drawn: Diagram, start: str) -> list[float]:
+    return [change.value for change in drawn.bifurcations if change.kind.startswith(start)]
+
+
+@pytest.mark.parametrize("points", [25, 70])
+def test_no_branch_goes_across_a_jump(points: int) -> None:
+    """The real rig's cycle jumps at r = 1.0535449: x1_max by 44 %, the period by 30 %."""
+    drawn = diagram(loop(robot=asymmetric_robot()), "r", np.linspace(0.98, 1.1, points))
+    below, above = branches(drawn, "limit_cycle")
+    assert below.points[-1].value < 1.0535449 < above.points[0].value
+    assert above.points[0].value - below.points[-1].value == pytest.approx(0.12 / (points - 1))
+    assert changes(drawn, "limit cycle jumps") == pytest.approx([1.0535449], abs=1e-7)
+    assert changes(drawn, "mode sequence") == pytest.approx([1.0375439], abs=1e-7)
+    for branch in (below, above):
+        steps = np.abs(np.diff([point.period for point in branch.points]))
+        assert np.max(steps) < 0.3
+
+
+def test_both_mirror_images_are_drawn_where_the_symmetry_is_broken() -> None:
+    drawn = diagram(loop(observer=40.0), "r", np.linspace(1.0002, 1.003, 15))
+    one, other, symmetric = branches(drawn, "limit_cycle")
+    np.testing.assert_allclose(
+        [(p.value, p.x1_min, p.x1_max) for p in one.points],
+        [(p.value, -p.x1_max, -p.x1_min) for p in other.points],
+        rtol=1e-9,
+    )
+    assert all(point.x1_min == -point.x1_max for point in symmetric.points)
+    assert one.points[-1].value < 1.0017818 < symmetric.points[0].value
+    assert changes(drawn, "symmetry breaking") == pytest.approx([1.0017818], abs=1e-7)
+
+
+def test_a_loss_of_symmetry_between_two_values_is_named() -> None:
+    """Of the pair below 1.000011 the grid of figure 9 has no value."""
+    drawn = diagram(loop(), "r", np.linspace(0.8, 1.2, 200))
+    assert changes(drawn, "symmetry breaking") == pytest.approx([1.000011], abs=1e-6)
+    assert len(branches(drawn, "limit_cycle")) == 1
 
 
 def test_over_the_observer_gain() -> None:
@@ -106,17 +144,6 @@ def test_all_changes_inside_one_interval_are_found() -> None:
     drawn = diagram(below, "r", [0.9, 1.2])
     changes = [b.value for b in drawn.bifurcations if "equilibria" in b.kind]
     assert changes == pytest.approx([1.0, r_max], rel=1e-12)
-
-
-def test_cycles_that_coexist_are_chained_each_to_its_nearest() -> None:
-    def cycle(size: float) -> Cycle:
-        return Cycle(np.array([size, 0.0]), 1, 6.0, -size, size, (0.1, 0.0), stable=True)
-
-    chains = chained([[cycle(0.3)], [cycle(0.5), cycle(0.31)], [cycle(0.32), cycle(0.52)]])
-    assert [(chain.first, [c.amplitude for c in chain.cycles]) for chain in chains] == [
-        (0, [0.3, 0.31, 0.32]),
-        (1, [0.5, 0.52]),
-    ]
 
 
 def test_a_link_that_halts_without_turning_ends_the_search() -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import minimize_scalar
 
@@ -114,6 +114,68 @@ def test_without_coulomb_friction() -> None:
     torque = (0.05 + 40.0 * 0.026) * 0.1
     assert found.r == pytest.approx(torque / 0.3 * math.exp(0.3 / torque - 1.0), rel=1e-12)
     assert found.estimate == pytest.approx(0.1 * (0.3 / torque - 1.0), rel=1e-12)
+
+
+def far_apart(low: float, high: float) -> st.SearchStrategy[float]:
+    """Numbers between two powers of ten, every decade as likely."""
+    return st.floats(low, high).map(lambda power: float(10.0**power))
+
+
+@st.composite
+def extreme_loops(draw: st.DrawFn) -> tuple[OneLinkRobot, Controller]:
+    """Robots that hold, and controllers that believe in, anything valid at all."""
+    coulomb = draw(st.one_of(st.just(0.0), far_apart(-12.0, 3.0)))
+    rise = draw(st.one_of(st.just(0.0), far_apart(-12.0, 3.0)))
+    damping = draw(st.one_of(st.just(0.0), far_apart(-6.0, 3.0)))
+    shape = draw(st.one_of(st.sampled_from([0.3, 1.0, 2.0, 4.0, 100.0]), st.floats(0.3, 4.0)))
+    believed = StribeckCurve(coulomb + rise, coulomb, draw(far_apart(-30.0, 30.0)), damping, shape)
+    held = draw(st.one_of(st.just(0.0), st.just(believed.static_torque), far_apart(-6.0, 3.0)))
+    true = StribeckCurve(held, 0.5 * held, 0.1, 0.05)
+    observer = draw(st.one_of(st.just(0.0), far_apart(-30.0, 30.0)))
+    model = OneLinkRobot(0.026, StribeckFriction.symmetric(believed))
+    return OneLinkRobot(0.03, StribeckFriction.symmetric(true)), Controller(
+        Gains(0.4, 0.02, observer, 1.0), model
+    )
+
+
+@given(extreme_loops())
+@settings(max_examples=400)
+def test_any_valid_loop_is_answered_and_a_dense_search_agrees(case: tuple[OneLinkRobot, Controller]) -> None:
+    """ln R on speeds dense at both ends of what the static friction holds."""
+    robot, controller = case
+    found = largest_compensation_with_rest(robot, controller).positive
+    assert found.r >= 0.0
+    assert found.estimate >= 0.0
+    curve, held = controller.model.friction.positive, robot.friction.positive.static_torque
+    slope = curve.viscous_damping + controller.gains.observer * controller.model.inertia
+    if held == 0.0 or curve.static_torque == 0.0 or slope == 0.0:
+        return
+    end = math.log(held) - math.log(slope)  # ln of the largest speed
+    away = np.concatenate([np.geomspace(1e-300, 1e-3, 4000), np.geomspace(1e-3, 600.0, 60_000)])  # ln(end/s)
+    log_y = np.minimum(curve.stribeck_shape * (end - away - math.log(curve.stribeck_velocity)), 600.0)
+    with np.errstate(divide="ignore"):
+        log_dry = np.logaddexp(np.log(curve.coulomb_torque), np.log(curve.stribeck_torque) - np.exp(log_y))
+    log_ratio = math.log(held) + np.log(-np.expm1(-away)) - log_dry
+    best = max(float(np.max(log_ratio)), math.log(held) - math.log(curve.static_torque))
+    if math.isinf(found.r):
+        assert best > 700.0
+    else:
+        assert math.log(found.r) == pytest.approx(best, abs=1e-4)
+        assert math.log(found.r) >= best - 1e-12 * (1.0 + abs(best))
+
+
+@pytest.mark.parametrize(("coulomb", "beta"), [(0.0, 1.5), (0.0, 4.0), (1e-9, 2.0), (0.0, 0.5)])
+def test_hardly_any_coulomb_friction_far_below_the_critical_gain(coulomb: float, beta: float) -> None:
+    """e^-y fades below every number before the touch: r_max is what it is, or infinite."""
+    curve = StribeckCurve(coulomb + 0.3, coulomb, 0.01, 0.05, beta)
+    robot = OneLinkRobot(0.026, StribeckFriction.symmetric(curve))
+    found = largest_compensation(robot, replace(MEAN, model=robot), observer_gain=0.01)
+    if coulomb > 0.0:
+        assert 0.9 * 0.3 / coulomb < found < (0.3 + coulomb) / coulomb
+    elif beta == 0.5:
+        assert 1.0 < found < math.inf
+    else:
+        assert found == math.inf
 
 
 def test_an_observer_without_gain_or_damping_rests_anywhere() -> None:

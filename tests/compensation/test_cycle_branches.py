@@ -144,6 +144,41 @@ def test_the_end_at_an_equilibrium_is_where_simulation_finds_it() -> None:
     assert find_cycle(LoopSection(loop(end - 1e-6, robot=rig)), start) == NoCycle("equilibrium")
 
 
+@pytest.mark.parametrize(
+    ("case", "gain", "span", "jump"),
+    [
+        (loop(1.0, robot=asymmetric_robot()), "r", (0.9, 1.2), 1.0535449),
+        (loop(1.05, robot=asymmetric_robot()), "n1", (0.1, 1.0), 0.2981881),
+        (loop(1.05, robot=asymmetric_robot()), "L", (20.0, 200.0), 68.62521),
+        (loop(1.05, robot=asymmetric_robot()), "n2", (0.0, 0.3), 0.03851328),
+    ],
+)
+def test_branches_go_on_beyond_a_jump_to_a_cycle_of_as_many_returns(
+    case: ClosedLoop, gain: Gain, span: tuple[float, float], jump: float
+) -> None:
+    """There x1_max jumps by more than 3 % of the extent, while the modes stay."""
+    first, second = cycle_branches(case, gain, span)
+    below, above = sorted((first, second), key=lambda branch: branch.points[0].value)
+    assert above.points[-1].value == span[1]
+    ends = below.events[-1], above.events[0]
+    assert [end.kind for end in ends] == ["mode sequence"] * 2
+    assert [end.value for end in ends] == pytest.approx([jump, jump], rel=1e-6)
+    assert all("grazes x2 = 0" in end.says for end in ends)
+    last, next_one = below.points[-1].cycle, above.points[0].cycle
+    assert abs(last.x1_max - next_one.x1_max) > 0.03 * (last.x1_max - last.x1_min)
+    reached, gone = 0.99 * jump, 1.01 * jump
+    point = min(below.points, key=lambda point: abs(point.value - reached)).cycle.point
+    for _ in range(25):  # an independent bisection: where iterating the map leaves the branch
+        middle = 0.5 * (reached + gone)
+        found = find_cycle(LoopSection(with_gain(case, gain, middle)), point)
+        assert isinstance(found, Cycle)
+        if abs(found.period - last.period) < abs(found.period - next_one.period):
+            point, reached = found.point, middle
+        else:
+            gone = middle
+    assert ends[0].value == pytest.approx(reached, rel=1e-8)
+
+
 def test_a_smooth_loss_of_symmetry_leaves_an_unstable_branch() -> None:
     curve = StribeckCurve(0.6595, 0.4160, 0.12, 0.0612)
     robot = OneLinkRobot(0.026, StribeckFriction.symmetric(curve))
@@ -186,6 +221,15 @@ def test_a_fold_of_cycles_has_an_unstable_side() -> None:
         < 1.0
         < branch.points[turned].cycle.multipliers[0].real
     )
+    reached, gone, point = 1.001, 1.002, branch.points[0].cycle.point
+    for _ in range(40):  # an independent bisection: up to where iterating the map stays small
+        middle = 0.5 * (reached + gone)
+        found = find_cycle(LoopSection(with_gain(case, "r", middle)), point)
+        if isinstance(found, Cycle) and found.amplitude < 0.1:
+            reached, point = middle, found.point
+        else:
+            gone = middle
+    assert reached == pytest.approx(fold.value, abs=1e-8)
     beyond = find_cycle(
         LoopSection(with_gain(case, "r", fold.value + 1e-6)), branch.points[turned].cycle.point
     )
@@ -195,7 +239,15 @@ def test_a_fold_of_cycles_has_an_unstable_side() -> None:
 
 @pytest.mark.parametrize(
     ("gain", "span", "said"),
-    [("b", (0.0, 1.0), "gain is"), ("r", (1.2, 1.5), "span"), ("L", (90, 10), "span")],
+    [
+        ("b", (0.0, 1.0), "gain is"),
+        ("r", (1.2, 1.5), "span of r .* loop's own 1.1"),
+        ("L", (90.0, 10.0), "span of L .* ascending"),
+        ("r", (-1.0, 1.2), "span of r .* >= 0 .eqs 5-7"),
+        ("r", (1.0, np.inf), "span of r .* finite number .eqs 5-7"),
+        ("r", (np.nan, 1.2), "span of r .* finite"),
+        ("n1", (0.0, 1.0), "span of n1 .*n1 > 0, .*eq 5"),
+    ],
 )
 def test_bad_input_is_named(gain: Gain, span: tuple[float, float], said: str) -> None:
     with pytest.raises(ModelError, match=said):

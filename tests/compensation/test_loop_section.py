@@ -7,12 +7,13 @@ import pytest
 
 from compensation.closed_loop import ClosedLoop, simulate
 from compensation.controller import Controller, Gains
+from compensation.equilibria import equilibrium_set
 from compensation.loop_returns import carry_for, derivative
 from compensation.loop_runs import run_for
 from compensation.loop_section import PATIENCE, TOLERANCE, LoopSection, with_gain
 from compensation.loop_tables import mode_parameters
 from compensation.orbits.periodic_orbits import Cycle, NoCycle, find_cycle
-from ident.model.friction import StribeckFriction
+from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
@@ -168,3 +169,31 @@ def test_with_gain_changes_one_gain() -> None:
     loop = section(1.0).loop
     assert with_gain(loop, "L", 50.0).controller.gains == replace(loop.controller.gains, observer=50.0)
     assert with_gain(loop, "r", 0.9).controller.gains == replace(loop.controller.gains, compensation=0.9)
+
+
+def test_a_link_that_rests_at_the_edge_of_its_set_makes_no_cycle() -> None:
+    """Its halts are apart by rounding alone, or it creeps up to the edge and halts no more."""
+    curve = StribeckCurve(
+        0.8609818745843592, 0.5541278616511862, 0.06013112907925833, 0.1269195760520449, 2.0
+    )
+    robot = OneLinkRobot(0.025017337646208872, StribeckFriction.symmetric(curve))
+    gains = Gains(0.34048701102624923, 0.007095031074440761, 151.5068879522968, 0.987121)
+    loop = ClosedLoop(robot, Controller(gains, robot))
+    rest = equilibrium_set(robot, loop.controller).x1_max
+    for x1 in (0.1, -0.1, 0.6, rest, rest * (1.0 + 1e-15), rest * (1.0 + 1e-12)):
+        found = find_cycle(LoopSection(loop), np.array([x1, 0.0]))
+        assert found in (NoCycle("equilibrium"), NoCycle("time reached"))
+
+
+def test_a_motion_that_comes_to_rest_has_no_derivative() -> None:
+    """It halts at the edge of its equilibrium set and slips on by a rounding, at no speed."""
+    friction = StribeckFriction(
+        StribeckCurve(0.7972744495790702, 0.5795829855197003, 0.09519846686614639, 0.08628530552394095, 2.0),
+        StribeckCurve(0.9057313263566219, 0.4803894928964654, 0.0852634198728053, 0.10271982326557003, 2.0),
+    )
+    robot = OneLinkRobot(0.051464631691412126, friction)
+    gains = Gains(0.7092780471566971, 0.07338949444526471, 70.41595121939415, 1.0122289859219886)
+    where = LoopSection(ClosedLoop(robot, Controller(gains, robot.mean())))
+    start = np.array([0.13472966548222248, -0.0006825877034719243])
+    assert where.derivative(start) is None
+    assert where.follow(start, 1).end_reason == "equilibrium"

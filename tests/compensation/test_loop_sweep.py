@@ -31,9 +31,10 @@ def loop(observer: float) -> ClosedLoop:
 def test_swept_cycles_are_those_found_one_by_one(observer: float, values: FloatArray) -> None:
     swept = stable_cycles(loop(observer), "r", values)
     for value, cycles in zip(values.tolist(), swept, strict=True):
-        (cycle,) = cycles
         alone = find_cycle(LoopSection(with_gain(loop(observer), "r", value)), np.array([0.6, 0.0]))
         assert isinstance(alone, Cycle)
+        assert len(cycles) == (1 if alone.returns % 2 else 2)  # with its mirror image
+        cycle = cycles[0]
         assert cycle.amplitude == pytest.approx(alone.amplitude, rel=1e-10)
         assert cycle.period == pytest.approx(alone.period, rel=1e-10)
         np.testing.assert_allclose(cycle.multipliers, alone.multipliers, rtol=1e-6, atol=1e-10)

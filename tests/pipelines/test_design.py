@@ -19,6 +19,7 @@ from pipelines.design import design, write_design
 from pipelines.results.folder import Owner, ResultFolder
 from pipelines.results.robot_file import RobotFile, paper_robot
 from pipelines.settings.loop import LoopDefaults
+from pipelines.terminal import answers
 
 GAINS = Gains(0.4, 0.02, observer=73.5, compensation=1.0)
 
@@ -80,6 +81,26 @@ def test_the_papers_numbers(tmp_path: Path) -> None:
     }
     assert found["equilibrium_sets"][-1]["single_point"] is True
     assert {"figure4.svg", "figure8.svg"} <= {path.name for path in tmp_path.iterdir()}
+
+
+def test_rests_beside_the_cycle_are_told_up_to_r_max(tmp_path: Path) -> None:
+    below = written(paper_robot(), tmp_path / "below", replace(GAINS, observer=40.0))
+    above = written(paper_robot(), tmp_path / "above")
+    assert below["rests_beside_the_cycle"]["r_max"]["value"] == pytest.approx(1.0349869921, abs=1e-9)
+    assert above["rests_beside_the_cycle"]["r_max"]["value"] == 1.0
+    assert below["rests_beside_the_cycle"]["r_max"]["interval95"] is None
+    (said,) = [line for line in answers.design(below) if "beside any limit cycle" in line]
+    assert said == "rests off the set point, beside any limit cycle, up to r = 1.035 at L = 40 1/s"
+
+
+def test_r_max_of_each_direction_has_its_interval(tmp_path: Path) -> None:
+    found = written(fitted(), tmp_path, replace(GAINS, observer=150.0))["rests_beside_the_cycle"]
+    mean = 0.5 * (POSITIVE.static_torque + NEGATIVE.static_torque)
+    assert found["positive"]["value"] == pytest.approx(POSITIVE.static_torque / mean, rel=1e-12)
+    assert found["negative"]["value"] == pytest.approx(NEGATIVE.static_torque / mean, rel=1e-12)
+    assert found["r_max"] == found["positive"]
+    low, high = found["positive"]["interval95"]
+    assert low < found["positive"]["value"] < high
 
 
 def test_recommended_gains_keep_clear_of_both_limits(tmp_path: Path) -> None:
@@ -193,6 +214,8 @@ def test_what_needs_no_gains_is_designed_without_them(tmp_path: Path) -> None:
     assert document["gains"] is None
     assert document["withheld"] == [why]
     assert {entry["withheld"] for entry in document["decay_rate"].values()} == {why}
+    assert {entry["withheld"] for entry in document["rests_beside_the_cycle"].values()} == {why}
+    assert not any("beside any limit cycle" in line for line in answers.design(document))
     assert document["equilibrium_sets"] == document["certificates"] == []
     advice, usual = document["recommended"], with_gains["recommended"]
     assert advice["compensation_gain"] == usual["compensation_gain"]

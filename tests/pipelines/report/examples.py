@@ -150,6 +150,10 @@ def design() -> dict[str, Any]:
             "positive": gain, "worst": gain, "mean": dict(gain, value=73.07),
             "negative": {"value": None, "unit": "1/s", "interval95": None, "withheld": f"v_s {HOSTILE}"},
         },
+        "rests_beside_the_cycle": {
+            side: dict(gain, value=r, unit="1", interval95=[r - 0.01, r + 0.01])
+            for side, r in (("positive", 1.0564), ("negative", 0.9436), ("r_max", 1.0564))
+        },
         "decay_rate": {"observer_error": dict(gain, value=-20.9), "loop": dict(gain, value=1.94)},
         "certificates": [
             {"robot": "both directions", "law": "mean", "hypothesis": "r = 1", "holds": True, "margin": 0.0,
