@@ -23,6 +23,7 @@ from compensation.equilibria import equilibrium_set
 from compensation.loop_section import LoopSection
 from compensation.orbits.periodic_orbits import Cycle, find_cycle
 from ident.model.friction import ModelError
+from ident.model.numbers import is_count, real_array, shown
 from ident.simulation.filippov_system import FloatArray
 
 DURATION: Final = 60.0  # [s] for which a start is followed
@@ -46,18 +47,23 @@ class Map(Protocol):
 
 @dataclass(frozen=True)
 class Rectangle:
-    """Starts (x1, v) in cells of equal area."""
+    """Starts (x1, v) in cells of equal area. Raises `ModelError` for what is no rectangle."""
 
     x1: tuple[float, float]  # [rad]
     velocity: tuple[float, float]  # [rad/s]
     cells: tuple[int, int]  # along x1, along v
 
     def __post_init__(self) -> None:
-        for name, (low, high) in (("x1", self.x1), ("velocity", self.velocity)):
-            if not (np.isfinite(low) and np.isfinite(high) and low < high):
-                raise ModelError(f"{name} of the starts is ({low}, {high}): an ascending pair of numbers")
-        if min(self.cells) < 1:
-            raise ModelError(f"cells are {self.cells}: at least one each way")
+        for name, span in (("x1", self.x1), ("velocity", self.velocity)):
+            ends = real_array(span)
+            if ends is None or ends.shape != (2,) or not -np.inf < ends[0] < ends[1] < np.inf:
+                raise ModelError(
+                    f"{name} of the starts is {shown(span)}: an ascending, finite pair (states of eq 8)"
+                )
+        if np.shape(self.cells) != (2,) or not all(is_count(cell) and cell >= 1 for cell in self.cells):
+            raise ModelError(
+                f"cells are {shown(self.cells)}: two whole numbers, at least one each way (states of eq 8)"
+            )
 
     @property
     def cell_area(self) -> float:

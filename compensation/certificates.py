@@ -3,7 +3,8 @@ r"""What the theory of section 4 certifies, for which compensator, and what it d
 Two laws meet in the loop: the robot's and the compensator's. Each statement below names the law that the
 compensator carries, the hypothesis, and by how much it holds or fails. The statements are:
 
-* *contraction*: L > L_c(worst) of the robot. For given x2(t) any two observer errors approach each other, eq
+* *contraction*: L > L_c(worst) of the robot, and L > 0, which the theorem asks of the observer even where
+  damping alone would do (L_c < 0). For given x2(t) any two observer errors approach each other, eq
   (17). It says that errors forget their start, not that they vanish, and needs nothing of the compensator's
   law.
 * *(a)* the error goes to zero for every x2(t): contraction, and e = 0 is a solution, which takes each
@@ -27,6 +28,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -35,6 +37,8 @@ from compensation.design_criteria import critical_observer_gains, loop_decay
 from compensation.equilibria import DIRECTIONS, Direction, equilibrium_set
 from ident.model.friction import StribeckFriction
 from ident.model.robot import OneLinkRobot
+
+NEEDS_GAIN: Final = "L = 0 1/s: fails, the theorem needs L > 0 (eq 17)"
 
 
 @dataclass(frozen=True)
@@ -78,20 +82,34 @@ def certificates(robot: OneLinkRobot, controller: Controller, *, law: str) -> tu
 def _contraction(robot: OneLinkRobot, controller: Controller, law: str) -> Certificate:
     worst = critical_observer_gains(robot).worst
     gain = controller.gains.observer
-    holds = gain > worst
+    margin = _margin(gain, worst)
+    holds = margin > 0.0
     if math.isinf(worst):
         says = (
             "beta < 1: the law is infinitely steep at rest, and no finite observer gain makes errors contract"
         )
+    elif gain == 0.0:
+        says = NEEDS_GAIN
     elif holds:
         says = f"observer errors contract at {gain - worst:.4g} 1/s for given x2(t); by itself not to zero"
     else:
         says = (
-            f"L = {gain:.4g} 1/s is below {worst:.4g} 1/s: errors grow while the link creeps in the worse "
-            "direction"
+            f"L = {gain:.4g} 1/s is {worst - gain:.4g} 1/s short of {worst:.4g} 1/s: errors grow while the "
+            "link creeps in the worse direction"
         )
-    margin = None if math.isinf(worst) else gain - worst
-    return Certificate(law, "contraction: L > L_c(worst) of the robot", holds, margin, "1/s", says)
+    return Certificate(
+        law,
+        "contraction: L > L_c(worst) of the robot",
+        holds,
+        margin if math.isfinite(margin) else None,
+        "1/s",
+        says,
+    )
+
+
+def _margin(gain: float, critical: float) -> float:
+    """What L [1/s] has beyond both a critical gain and 0; eq (17) needs it to be positive."""
+    return gain - max(critical, 0.0)
 
 
 def _exactness(robot: OneLinkRobot, controller: Controller, law: str) -> tuple[Certificate, Certificate]:
@@ -114,7 +132,7 @@ def _exactness(robot: OneLinkRobot, controller: Controller, law: str) -> tuple[C
         holds=r == 1.0,
         margin=0.0 - abs(r - 1.0),
         unit="1",
-        says="the law is compensated in full" if r == 1.0 else f"r = {r:.6g}: e = 0 is no solution",
+        says="the law is compensated in full" if r == 1.0 else f"r = {r}: e = 0 is no solution",
     )
     return own, unity
 
@@ -193,15 +211,17 @@ def _static_statements(
 
 def _papers_criterion(robot: OneLinkRobot, controller: Controller, law: str) -> Certificate:
     limit = critical_observer_gains(robot).mean
-    gain = controller.gains.observer
+    margin = _margin(controller.gains.observer, limit)
     symmetric = robot.friction.positive == robot.friction.negative
     return Certificate(
         law=law,
         hypothesis="L > L_c(mean), the paper's criterion for a symmetric robot",
-        holds=gain > limit,
-        margin=gain - limit if math.isfinite(limit) else None,
+        holds=margin > 0.0,
+        margin=margin if math.isfinite(margin) else None,
         unit="1/s",
-        says="the robot is symmetric: this is the contraction above"
+        says=NEEDS_GAIN
+        if controller.gains.observer == 0.0
+        else "the robot is symmetric: this is the contraction above"
         if symmetric
         else "certifies nothing here: the robot's directions differ from their mean",
     )
@@ -212,14 +232,16 @@ def _local_contraction(
 ) -> Certificate:
     critical = critical_observer_gains(robot)
     limit = critical.positive if direction == "positive" else critical.negative
-    gain = controller.gains.observer
+    margin = _margin(controller.gains.observer, limit)
     return Certificate(
         law=law,
         hypothesis=f"local contraction: L > L_c ({direction})",
-        holds=gain > limit,
-        margin=gain - limit if math.isfinite(limit) else None,
+        holds=margin > 0.0,
+        margin=margin if math.isfinite(margin) else None,
         unit="1/s",
-        says=f"errors {'shrink' if gain > limit else 'grow'} while the link creeps that way",
+        says=NEEDS_GAIN
+        if controller.gains.observer == 0.0
+        else f"errors {'shrink' if margin > 0.0 else 'grow'} while the link creeps that way",
     )
 
 

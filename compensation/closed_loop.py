@@ -28,6 +28,7 @@ from compensation.controller import Controller
 from compensation.loop_runs import EVENT_NAMES, SURFACES, follow, run_for
 from compensation.loop_tables import mode_parameters
 from ident.model.friction import ModelError
+from ident.model.numbers import is_number, real_array, shown
 from ident.model.robot import OneLinkRobot
 from ident.simulation.compiled import compiled
 from ident.simulation.filippov_system import FloatArray
@@ -46,6 +47,12 @@ class ClosedLoop:
 
     robot: OneLinkRobot
     controller: Controller
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.robot, OneLinkRobot):
+            raise ModelError(f"robot is {self.robot!r}: a OneLinkRobot (eq 1)")
+        if not isinstance(self.controller, Controller):
+            raise ModelError(f"controller is {self.controller!r}: a Controller (eqs 5-6)")
 
     @cached_property
     def modes(self) -> FloatArray:
@@ -72,10 +79,7 @@ def simulate(
         If a start, time or tolerance is no number, or times run backwards or out of the duration.
     """
     state = _checked_start(start)
-    if not (math.isfinite(duration) and duration > 0):
-        raise ModelError(f"duration is {duration}: a positive number of seconds")
-    if not 0 < tolerance < 1:
-        raise ModelError(f"tolerance is {tolerance}: between 0 and 1, relative to the state")
+    check_accuracy(duration, tolerance)
     if times is None:
         _, marks = _run(loop, state.copy(), np.empty(0), np.empty((0, 3)), duration, tolerance)
         points = min(GRID_LIMIT, max(2, math.ceil(duration * GRID_RATE)))
@@ -98,9 +102,13 @@ def simulate(
 def torque(loop: ClosedLoop, states: ArrayLike) -> FloatArray:
     """Torque u = -n1 x1 - n2 x2 + r F^(x2) [N m] that the controller gives at states (k, 3). Eqs (5)-(6).
 
-    At x2 = 0 the compensation is set-valued; its middle, 0 for a symmetric law, is given.
+    At x2 = 0 the compensation is set-valued; its middle, 0 for a symmetric law, is given. Raises `ModelError`
+    for states that are not finite, as after a run that broke off.
     """
-    x = np.atleast_2d(np.asarray(states, dtype=np.float64))
+    found = real_array(states)
+    x = None if found is None else np.atleast_2d(found)
+    if x is None or x.ndim != 2 or x.shape[1] != 3 or not np.isfinite(x).all():
+        raise ModelError(f"states are {shown(states)}: finite numbers of shape (k, 3) (eqs 5-6)")
     gains = loop.controller.gains
     low, high = loop.controller.model.friction.torque_interval(x[:, 1])
     feedback: FloatArray = -gains.proportional * x[:, 0] - gains.derivative * x[:, 1]
@@ -143,27 +151,42 @@ def _joined(parts: Sequence[Marks]) -> Marks:
 
 
 def _checked_start(start: ArrayLike) -> FloatArray:
-    state = np.array(start, dtype=np.float64)
-    if state.shape != (3,) or not all(map(math.isfinite, state.tolist())):
-        raise ModelError(f"start is {start!r}: three finite numbers x1 [rad], x2 [rad/s], x3 [rad/s] (eq 8)")
+    state = real_array(start)
+    if state is None or state.shape != (3,) or not all(map(math.isfinite, state.tolist())):
+        raise ModelError(
+            f"start is {shown(start)}: three finite numbers x1 [rad], x2 [rad/s], x3 [rad/s] (eq 8)"
+        )
     return state
+
+
+def check_accuracy(duration: float, tolerance: float) -> None:
+    """`ModelError` unless the duration [s] and the tolerance [-] of a run are possible ones."""
+    if not (is_number(duration) and duration > 0):
+        raise ModelError(f"duration is {duration!r}: a finite number of seconds > 0 (eq 8)")
+    if not (is_number(tolerance) and 0 < tolerance < 1):
+        raise ModelError(f"tolerance is {tolerance!r}: between 0 and 1, relative to the largest state (eq 8)")
 
 
 def checked_times(times: ArrayLike, duration: float) -> FloatArray:
     """Times (k,) [s] that ascend within a duration [s]; ModelError otherwise."""
-    wanted = np.array(times, dtype=np.float64)
-    if wanted.ndim == 1 and _ascend_within(wanted, duration):
-        return wanted
-    if wanted.ndim != 1 or not np.isfinite(wanted).all():
-        raise ModelError("times are no list of finite numbers [s]")
-    raise ModelError(f"times must ascend within 0 and the duration {duration:g} s")
+    wanted = real_array(times)
+    if wanted is None or wanted.ndim != 1:
+        raise ModelError(f"times are {shown(times)}: a list of finite numbers [s] (eq 8)")
+    failed = _first_out_of_order(wanted, float(duration))
+    if failed >= 0:
+        raise ModelError(
+            f"times[{failed}] is {wanted[failed]:g} s: times must ascend within 0 and the duration, "
+            f"{duration:g} s (eq 8)"
+        )
+    return wanted
 
 
 @compiled
-def _ascend_within(times: FloatArray, duration: float) -> bool:
+def _first_out_of_order(times: FloatArray, duration: float) -> int:
+    """Index of the first time that is before the last one, beyond the duration or nan; -1: none."""
     before = 0.0
-    for time in times:
-        if not before <= time <= duration:
-            return False
-        before = time
-    return True
+    for k in range(times.size):
+        if not before <= times[k] <= duration:
+            return k
+        before = times[k]
+    return -1

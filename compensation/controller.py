@@ -8,16 +8,19 @@ that its observer uses. What the robot really is, it cannot know.
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from typing import Final
 
 from ident.model.friction import ModelError
+from ident.model.numbers import is_number
 from ident.model.robot import OneLinkRobot
+
+SWEPT: Final = {"r": "compensation", "L": "observer"}  # by their symbols: the gains of diagrams
 
 
 @dataclass(frozen=True)
 class Gains:
-    """The four gains of eqs (5)-(7)."""
+    """The four gains of eqs (5)-(7). Raises `ModelError` for what is no gain."""
 
     proportional: float  # n1 [N m/rad], > 0
     derivative: float  # n2 [N m s/rad], >= 0
@@ -27,8 +30,8 @@ class Gains:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not math.isfinite(value) or value < 0:
-                raise ModelError(f"{field.name} gain is {value}: a gain is a finite number >= 0 (eqs 5-7)")
+            if not (is_number(value) and value >= 0):
+                raise ModelError(f"{field.name} gain is {value!r}: a gain is a finite number >= 0 (eqs 5-7)")
         if self.proportional == 0:
             raise ModelError("proportional gain is 0: n1 > 0, or no position is a set point (eq 5)")
 
@@ -39,3 +42,23 @@ class Controller:
 
     gains: Gains
     model: OneLinkRobot
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.gains, Gains):
+            raise ModelError(f"gains are {self.gains!r}: Gains (eqs 5-7)")
+        if not isinstance(self.model, OneLinkRobot):
+            raise ModelError(
+                f"model is {self.model!r}: the OneLinkRobot that the compensator believes in (eq 6)"
+            )
+
+
+def with_gain(controller: Controller, parameter: str, value: float) -> Controller:
+    """The controller with another r [-] or L [1/s].
+
+    Raises `ModelError` for another parameter, or a value that is no gain.
+    """
+    if parameter not in SWEPT:
+        raise ModelError(
+            f"parameter is {parameter!r}: 'r' or 'L', the gains of the paper's diagrams (eqs 6-7)"
+        )
+    return replace(controller, gains=replace(controller.gains, **{SWEPT[parameter]: value}))

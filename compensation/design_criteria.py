@@ -32,7 +32,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.controller import Controller
-from ident.model.friction import StribeckCurve, StribeckFriction
+from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
+from ident.model.numbers import is_number, real_array, shown
 from ident.model.robot import OneLinkRobot
 
 
@@ -50,7 +51,9 @@ class CriticalGains:
 
 
 def critical_observer_gain(curve: StribeckCurve, *, inertia: float) -> float:
-    """L_c [1/s] of one curve on an inertia [kg m^2], eqs (11)-(13)."""
+    """L_c [1/s] of one curve on an inertia [kg m^2], eqs (11)-(13). `ModelError` for what is no inertia."""
+    if not (is_number(inertia) and inertia > 0):
+        raise ModelError(f"inertia is {inertia!r} kg m^2: a finite J > 0 (eq 11)")
     return (curve.steepest_fall - curve.viscous_damping) / inertia
 
 
@@ -71,21 +74,37 @@ def sector_constant(friction: StribeckFriction) -> float:
 def sector_slack(friction: StribeckFriction, x2: ArrayLike, x3: ArrayLike) -> NDArray[np.float64]:
     """-lambda x3^2 - (F(x2) - F(x2 + x3)) x3 [N m rad/s], what eq (16) leaves; never negative.
 
-    x2, x3 [rad/s] of any common shape. Where the law is set-valued, its worst values are taken.
+    x2, x3 [rad/s] of any common shape. Where the law is set-valued, its worst values are taken. Raises
+    `ModelError` for what is no velocity, or shapes that do not fit.
     """
-    estimate, error = np.asarray(x2, dtype=np.float64), np.asarray(x3, dtype=np.float64)
+    estimate, error = _velocities("x2", x2), _velocities("x3", x3)
+    try:
+        np.broadcast_shapes(estimate.shape, error.shape)
+    except ValueError:
+        raise ModelError(
+            f"x2 of shape {estimate.shape}, x3 of shape {error.shape}: one common shape (eq 16)"
+        ) from None
     low, high = friction.torque_interval(estimate)
     low_true, high_true = friction.torque_interval(estimate + error)
     difference = np.where(error > 0, high - low_true, low - high_true)
     return -sector_constant(friction) * error**2 - difference * error
 
 
+def _velocities(name: str, values: ArrayLike) -> NDArray[np.float64]:
+    found = real_array(values)
+    if found is None or not np.all(np.isfinite(found)):
+        raise ModelError(f"{name} is {shown(values)}: finite numbers [rad/s] (eq 16)")
+    return found
+
+
 def observer_error_decay(robot: OneLinkRobot, observer_gain: float) -> float:
     """L - L_c(worst) [1/s], the guaranteed exponential rate of eq (17).
 
     Errors of two solutions under the same x2(t) approach each other at this rate. Negative: while the link
-    creeps in the worse direction, errors grow.
+    creeps in the worse direction, errors grow. Raises `ModelError` unless L > 0, which eq (17) needs.
     """
+    if not (is_number(observer_gain) and observer_gain > 0):
+        raise ModelError(f"observer_gain is {observer_gain!r} 1/s: a finite L > 0 (eq 17)")
     return observer_gain - critical_observer_gains(robot).worst
 
 

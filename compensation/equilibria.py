@@ -22,11 +22,13 @@ The edges are roots of a scalar function: see `torque_balance`.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
-from compensation.controller import Controller
+from compensation.controller import Controller, with_gain
 from compensation.torque_balance import TorqueBalance
+from ident.model.friction import ModelError
+from ident.model.numbers import is_number
 from ident.model.robot import OneLinkRobot
 
 Direction = Literal["positive", "negative"]
@@ -82,6 +84,10 @@ class EquilibriumSet:
 
     def contains(self, position: float, *, tolerance: float = 0.0) -> bool:
         """Whether x1 = `position` [rad] is within `tolerance` [rad] of an equilibrium."""
+        if not (is_number(position) and is_number(tolerance) and tolerance >= 0.0):
+            raise ModelError(
+                f"position is {position!r} rad, tolerance {tolerance!r} rad: finite, tolerance >= 0 (eq 9)"
+            )
         if abs(position) <= tolerance:
             return True
         return any(s.x1_min - tolerance <= position <= s.x1_max + tolerance for s in self.segments)
@@ -100,18 +106,20 @@ def equilibrium_set(robot: OneLinkRobot, controller: Controller) -> EquilibriumS
 def equilibrium_sets(
     robot: OneLinkRobot, controller: Controller, *, parameter: Literal["r", "L"], values: Iterable[float]
 ) -> tuple[EquilibriumSet, ...]:
-    """The sets over a sweep of r or of L [1/s], the other gains as in `controller`: figures 4, 8 and 9."""
-    name = "compensation" if parameter == "r" else "observer"
-    return tuple(
-        equilibrium_set(
-            robot, Controller(replace(controller.gains, **{name: float(value)}), controller.model)
-        )
-        for value in values
-    )
+    """The sets over a sweep of r or of L [1/s], the other gains as in `controller`: figures 4, 8 and 9.
+
+    Raises `ModelError` for another parameter, or a value that is no gain.
+    """
+    return tuple(equilibrium_set(robot, with_gain(controller, parameter, value)) for value in values)
 
 
 def torque_balance(robot: OneLinkRobot, controller: Controller, direction: Direction) -> TorqueBalance:
-    """What the controller applies at rest against what the robot withstands, for x2 in `direction`."""
+    """What the controller applies at rest against what the robot withstands, for x2 in `direction`.
+
+    Raises `ModelError` for another word than a direction.
+    """
+    if direction not in DIRECTIONS:
+        raise ModelError(f"direction is {direction!r}: 'positive' or 'negative', the sign of x2 (eqs 9-10)")
     true = robot.friction.positive if direction == "positive" else robot.friction.negative
     model = controller.model.friction
     believed = model.positive if direction == "positive" else model.negative

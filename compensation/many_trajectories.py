@@ -17,13 +17,15 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from compensation.closed_loop import STEP_LIMIT, ClosedLoop, checked_times
+from compensation.closed_loop import STEP_LIMIT, ClosedLoop, check_accuracy, checked_times
+from compensation.controller import Gains
 from compensation.loop_lanes import LOOP_LANES
 from compensation.loop_modes import surfaces
 from compensation.loop_parameters import COLUMNS
 from compensation.loop_runs import begin, is_exponential, run_at, run_for
-from compensation.loop_tables import gain_row, tables_over_gains
+from compensation.loop_tables import GAIN_NAMES, gain_row, tables_over_gains
 from ident.model.friction import ModelError
+from ident.model.numbers import is_count, real_array, shown
 from ident.simulation.compiled import compiled, owning, passed
 from ident.simulation.filippov_system import FloatArray, Signs
 from ident.simulation.integrate import END_REASONS, Progress
@@ -75,18 +77,14 @@ def simulate_many(
     Raises
     ------
     ModelError
-        If starts, gains, times or tolerance are no numbers, have no fitting shape or run backwards.
+        If starts, gains, times, tolerance or parts are no numbers, have no fitting shape or run backwards; it
+        names the trajectory and the gain.
     """
-    first = np.array(starts, dtype=np.float64, order="C")
-    if first.ndim != 2 or first.shape[1] != STATES or not np.isfinite(first).all():
-        raise ModelError(f"starts of shape {first.shape}: finite numbers of shape (n, 3) are needed (eq 8)")
-    rows = np.asarray(gain_row(loop.controller)[np.newaxis] if gains is None else gains, dtype=np.float64)
-    if rows.ndim != 2 or rows.shape[1] != 4 or (gains is not None and rows.shape[0] != first.shape[0]):
-        raise ModelError(f"gains of shape {rows.shape}: n1, n2, L, r for each of {first.shape[0]} starts")
-    if not (np.isfinite(rows).all() and (rows >= 0.0).all() and (rows[:, 0] > 0.0).all()):
-        raise ModelError("gains must be finite, n1 > 0 and the others >= 0 (eqs 5-7)")
-    if not (0 < duration < np.inf and 0 < tolerance < 1):
-        raise ModelError(f"duration {duration} s, tolerance {tolerance}: positive, the tolerance below 1")
+    first = _checked_starts(starts)
+    rows = gain_row(loop.controller)[np.newaxis] if gains is None else _checked_gains(gains, first.shape[0])
+    check_accuracy(duration, tolerance)
+    if not (is_count(parts) and parts >= 1):
+        raise ModelError(f"parts is {parts!r}: a whole number >= 1, into which the runs of eq (8) are cut")
     tables = tables_over_gains(loop.robot, loop.controller, rows)
     runs = np.array([run_for(tables[0])])  # the laws, and so the method, are the same for all
     wanted = checked_times(times, duration)
@@ -102,6 +100,33 @@ def simulate_many(
     for _ in map_parts(run_part, range(parts)):
         pass
     return Trajectories(wanted, states, reasons, end_times, first)
+
+
+def _checked_starts(starts: ArrayLike) -> FloatArray:
+    first = real_array(starts)
+    if first is None or first.ndim != 2 or first.shape[1] != STATES:
+        shape = shown(starts) if first is None else f"of shape {first.shape}"
+        raise ModelError(f"starts are {shape}: finite numbers of shape (n, 3) are needed (eq 8)")
+    if not np.isfinite(first).all():
+        i = int(np.argmin(np.isfinite(first).all(axis=1)))
+        raise ModelError(f"starts[{i}] is {first[i].tolist()}: finite x1 [rad], x2, x3 [rad/s] (eq 8)")
+    return first
+
+
+def _checked_gains(gains: ArrayLike, count: int) -> FloatArray:
+    rows = real_array(gains)
+    if rows is None or rows.shape != (count, len(GAIN_NAMES)):
+        shape = shown(gains) if rows is None else f"of shape {rows.shape}"
+        raise ModelError(f"gains are {shape}: n1, n2, L, r for each of {count} starts (eqs 5-7)")
+    good = np.isfinite(rows) & (rows >= 0.0)
+    good[:, 0] &= rows[:, 0] > 0.0
+    if not good.all():
+        i = int(np.argmin(good.all(axis=1)))
+        try:
+            Gains(**dict(zip(GAIN_NAMES, rows[i].tolist(), strict=True)))
+        except ModelError as broken:
+            raise ModelError(f"gains[{i}]: {broken}") from None
+    return rows
 
 
 @compiled

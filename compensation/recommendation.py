@@ -19,7 +19,7 @@ own law can, so it is recommended wherever the directions differ.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Literal
 
 import numpy as np
@@ -27,7 +27,8 @@ import numpy as np
 from compensation.controller import Controller, Gains
 from compensation.design_criteria import critical_observer_gains, loop_decay
 from compensation.equilibria import DIRECTIONS, Direction, equilibrium_set
-from ident.model.friction import StribeckFriction
+from ident.model.friction import ModelError, StribeckFriction
+from ident.model.numbers import is_number
 from ident.model.robot import OneLinkRobot
 
 Law = Literal["per-direction", "mean"]
@@ -55,6 +56,14 @@ class ThresholdEnds:
     per_direction: float
     mean: float
 
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not (value == math.inf or (is_number(value) and value >= 0.0)):
+                raise ModelError(
+                    f"{field.name} threshold is {value!r}: r >= 0, inf where nothing limits it (eq 6)"
+                )
+
 
 def overcompensation_thresholds(robot: OneLinkRobot, model: StribeckFriction) -> dict[Direction, float]:
     """For each direction the largest r [-] with r g^(s) <= g(s) at every speed s; infinite if g^ = 0."""
@@ -75,8 +84,16 @@ def recommend(
     """Advice for each compensator, the recommended one first; a symmetric robot has one law only.
 
     `worst_gain_high` [1/s] is the upper 95 % end of the worst critical gain, `thresholds` the lower ends of
-    the overcompensation thresholds; without them 1 % of uncertainty is assumed for r, and none for L.
+    the overcompensation thresholds; without them 1 % of uncertainty is assumed for r, and none for L. Raises
+    `ModelError` for what is no gain.
     """
+    for name, gain in (("proportional", proportional), ("derivative", derivative)):
+        if gain is not None and not is_number(gain):
+            raise ModelError(f"{name} gain is {gain!r}: a finite number (eq 5)")
+    if not (worst_gain_high is None or worst_gain_high == math.inf or is_number(worst_gain_high)):
+        raise ModelError(
+            f"worst_gain_high is {worst_gain_high!r} 1/s: a number, inf where no gain is enough (eq 11)"
+        )
     pd = None if proportional is None or derivative is None else (proportional, derivative)
     symmetric = robot.friction.positive == robot.friction.negative
     laws: tuple[Law, ...] = ("mean",) if symmetric else ("per-direction", "mean")

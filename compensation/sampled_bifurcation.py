@@ -14,13 +14,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final, Literal
 
+import numpy as np
+
 from compensation.bifurcation import Bifurcation, Branch, Point
-from compensation.controller import Controller
+from compensation.controller import Controller, with_gain
 from compensation.sampled_ends import MOST_SAMPLES, SampledEnd, sampled_end
 from compensation.sampled_loop import Map, Sampling
+from ident.model.friction import ModelError
+from ident.model.numbers import real_array, shown
 from ident.model.robot import OneLinkRobot
 
 _TURNS: Final = 40.0  # of the undamped loop, 2 pi sqrt(J/n1), that a run lasts
@@ -52,7 +56,15 @@ def sampled_cycles(
     map: Map = map,
     tick: Callable[[int], None] | None = None,
 ) -> SampledCycles:
-    """Limit cycles over `values` of r [-] or L [1/s], rising; `tick` hears how many values are done."""
+    """Limit cycles over `values` of r [-] or L [1/s], rising; `tick` hears how many values are done.
+
+    Raises `ModelError` for another parameter, or values that are no rising gains.
+    """
+    grid = real_array(values)
+    if grid is None or grid.ndim != 1 or grid.size == 0 or not np.all(np.diff(grid) > 0.0):
+        raise ModelError(f"values of {parameter} are {shown(values)}: a list of rising numbers (eqs 6-7)")
+    for value in grid[[0, -1]].tolist():
+        with_gain(controller, parameter, value)  # refuses what is no gain
     most = MOST_SAMPLES * sampling.period
     duration = min(settling_time(robot, controller), most)
     far = _START * max(_static(robot)) / controller.gains.proportional
@@ -93,12 +105,6 @@ def settling_time(robot: OneLinkRobot, controller: Controller) -> float:
         robot.friction.positive.viscous_damping, robot.friction.negative.viscous_damping
     )
     return max(_TURNS * turn, 10.0 * damping / gains.proportional)
-
-
-def with_gain(controller: Controller, parameter: Literal["r", "L"], value: float) -> Controller:
-    """The controller with another r [-] or L [1/s]."""
-    name = "compensation" if parameter == "r" else "observer"
-    return Controller(replace(controller.gains, **{name: float(value)}), controller.model)
 
 
 def _static(robot: OneLinkRobot) -> tuple[float, float]:

@@ -24,6 +24,8 @@ from numpy.typing import NDArray
 from compensation.controller import Controller
 from compensation.orbits.steady_state import SteadyState, classify
 from compensation.sampled_loop import LongRun, Sampling
+from ident.model.friction import ModelError
+from ident.model.numbers import is_count, is_number, real_array, shown
 from ident.model.robot import OneLinkRobot
 
 FloatArray = NDArray[np.float64]
@@ -53,8 +55,18 @@ def sampled_end(
 ) -> SampledEnd:
     """Watch a run from rest at `start` (q [rad]) until one of the times `stretches` [s], rising, decides it.
 
-    The first stretch is always watched; the others as far as `most_samples` samples last.
+    The first stretch is always watched; the others as far as `most_samples` samples last. Raises `ModelError`
+    for a start or stretches that are none.
     """
+    if not is_number(start):
+        raise ModelError(f"start is {start!r}: a finite q [rad] (eq 1)")
+    times = real_array(stretches)
+    if times is None or times.ndim != 1 or times.size == 0 or not _rise(times):
+        raise ModelError(
+            f"stretches are {shown(stretches)}: rising, finite numbers of seconds > 0 (eq 8, as sampled)"
+        )
+    if not (is_count(most_samples) and most_samples >= 1):
+        raise ModelError(f"most_samples is {most_samples!r}: a whole number >= 1 (eq 8, as sampled)")
     run = LongRun(robot, controller, sampling, start=(start, 0.0), reference=reference)
     x1 = np.empty(0)
     made = 0
@@ -78,6 +90,10 @@ def sampled_end(
         if state.verdict != "undecided":
             break
     return _judged(state, x1, sampling.period, made)
+
+
+def _rise(times: FloatArray) -> bool:
+    return bool(np.all(np.isfinite(times)) and times[0] > 0.0 and np.all(np.diff(times) > 0.0))
 
 
 def _at_rest(place: float, made: int, sampling: Sampling) -> SampledEnd:

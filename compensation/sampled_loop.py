@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, Protocol, TypeVar
+from typing import Final, Literal, Protocol, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from compensation.controller import Controller
 from compensation.observer import euler_change, exact_change
 from ident.model.friction import ModelError
+from ident.model.numbers import is_count, is_number, real_array, shown
 from ident.model.robot import OneLinkRobot
 from ident.response import NO_RIPPLE, TorqueRipple, advance_with_ripple, law_array, plant_array
 from ident.simulation.compiled import compiled, owning
@@ -40,6 +41,7 @@ _Settings = tuple[float, float, bool, int, float, float]  # h, resolution, exact
 _FASTEST: Final = 1e6  # times the speeds of the loop: an estimate beyond has run away
 ENDS: Final = ("time reached", "at rest for good", "runs away")
 _REACHED, _AT_REST, _AWAY = range(3)
+ObserverUpdate = Literal["euler", "exact"]
 T = TypeVar("T")
 R = TypeVar("R")
 
@@ -58,19 +60,25 @@ class Sampling:
 
     period: float  # h [s]
     resolution: float = 0.0  # one encoder count [rad]; 0: not rounded
-    observer_update: Literal["euler", "exact"] = "euler"
+    observer_update: ObserverUpdate = "euler"
     delay: int = 0  # samples between measuring and acting
     torque_limit: float = math.inf  # [N m]
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.period) and self.period > 0):
-            raise ModelError(f"sample period is {self.period} s: a sampled loop needs one > 0")
-        if not (math.isfinite(self.resolution) and self.resolution >= 0):
-            raise ModelError(f"encoder resolution is {self.resolution} rad a count: it must be >= 0")
-        if self.delay < 0:
-            raise ModelError(f"delay is {self.delay} samples: it must be >= 0")
-        if not self.torque_limit > 0:
-            raise ModelError(f"torque limit is {self.torque_limit} N m: it must be > 0")
+        if not (is_number(self.period) and self.period > 0):
+            raise ModelError(f"sample period is {self.period!r} s: a finite h > 0 (eqs 5-7, as sampled)")
+        if not (is_number(self.resolution) and self.resolution >= 0):
+            raise ModelError(
+                f"encoder resolution is {self.resolution!r} rad a count: finite, >= 0 (eqs 5-7, as sampled)"
+            )
+        if self.observer_update not in get_args(ObserverUpdate):
+            raise ModelError(f"observer_update is {self.observer_update!r}: 'euler' or 'exact', for eq (7)")
+        if not (is_count(self.delay) and self.delay >= 0):
+            raise ModelError(f"delay is {self.delay!r}: a whole number of samples >= 0 (eqs 5-7, as sampled)")
+        if not (self.torque_limit == math.inf or (is_number(self.torque_limit) and self.torque_limit > 0)):
+            raise ModelError(
+                f"torque limit is {self.torque_limit!r} N m: > 0, inf for none (eqs 5-7, as sampled)"
+            )
 
 
 @dataclass(frozen=True)
@@ -167,8 +175,11 @@ class LongRun:
         ripple: TorqueRipple = NO_RIPPLE,
     ) -> None:
         """From q [rad] and v [rad/s]; raises `ModelError` for a start or reference that is not finite."""
-        if not all(map(math.isfinite, (*start, reference))):
-            raise ModelError(f"start {start}, reference {reference} rad: finite numbers")
+        x0 = real_array(start)
+        if x0 is None or x0.shape != (2,) or not np.all(np.isfinite(x0)):
+            raise ModelError(f"start is {shown(start)}: two finite numbers q [rad], v [rad/s] (eq 1)")
+        if not is_number(reference):
+            raise ModelError(f"reference is {reference!r}: a finite q_r [rad] (eq 5)")
         gains, model = controller.gains, controller.model.friction
         turning = math.sqrt(gains.proportional / robot.inertia)
         speeds = (model.positive.stribeck_velocity, model.negative.stribeck_velocity, abs(start[1]))
@@ -183,8 +194,17 @@ class LongRun:
         """The next samples into `rows` (1, n), measured only, or (5, n); returns how many were run.
 
         A run at rest for good is filled up with its last sample; one that ran away leaves the rows after it
-        as they are. Both go on no further.
+        as they are. Both go on no further. Raises `ModelError` for a run that has ended, or other rows.
         """
+        if not (
+            isinstance(rows, np.ndarray)
+            and rows.dtype == np.float64
+            and rows.ndim == 2
+            and rows.shape[0] in (1, 5)
+        ):
+            raise ModelError(
+                f"rows are {shown(rows)}: an array of floats, (1, n) or (5, n) (eqs 5-7, as sampled)"
+            )
         if self.end != ENDS[_REACHED]:
             raise ModelError(f"a run that has ended ({self.end}) does not go on")
         made, end = _run(self._plant, self._controller, self._settings, self._memory, self._pending, rows)
@@ -207,7 +227,7 @@ def run_sampled(
     The last sample is the last one not after `duration`, or before the controller runs away. Raises
     `ModelError` for a start, duration or reference that is not finite.
     """
-    rows = _checked_rows(5, start, duration, sampling, reference)
+    rows = _rows(5, duration, sampling)
     run = LongRun(robot, controller, sampling, start=start, reference=reference, ripple=ripple)
     made = run.fill(rows)
     if run.end == ENDS[_AWAY]:
@@ -247,31 +267,36 @@ def run_many(
 
     Raises `ModelError` where the numbers of robots, controllers and starts do not fit, or as `run_sampled`.
     """
-    m = max(len(robots), len(controllers), len(starts))
+    m = max(len(robots), len(controllers), len(starts), 1)
     for name, values in (("robots", robots), ("controllers", controllers), ("starts", starts)):
         if len(values) not in (1, m):
-            raise ModelError(f"{len(values)} {name} for {m} runs: give one for each, or one for all")
-    rows = [_checked_rows(1, starts[i % len(starts)], duration, sampling, reference) for i in range(m)]
+            raise ModelError(
+                f"{len(values)} {name} for {m} runs: give one for each, or one for all (eqs 5-7, as sampled)"
+            )
+    runs = [
+        LongRun(
+            robots[i % len(robots)],
+            controllers[i % len(controllers)],
+            sampling,
+            start=starts[i % len(starts)],
+            reference=reference,
+        )
+        for i in range(m)
+    ]
+    rows = [_rows(1, duration, sampling) for _ in runs]
 
     def play(i: int) -> FloatArray:
-        start = starts[i % len(starts)]
-        robot, controller = robots[i % len(robots)], controllers[i % len(controllers)]
-        run = LongRun(robot, controller, sampling, start=start, reference=reference)
-        made = run.fill(rows[i])
-        if run.end == ENDS[_AWAY]:
+        made = runs[i].fill(rows[i])
+        if runs[i].end == ENDS[_AWAY]:
             rows[i][0, made:] = math.nan
         return np.asarray(rows[i][0])
 
     return np.array(list(map(play, range(m))))
 
 
-def _checked_rows(
-    count: int, start: tuple[float, float], duration: float, sampling: Sampling, reference: float
-) -> FloatArray:
-    if not all(map(math.isfinite, (*start, duration, reference))) or duration < 0:
-        raise ModelError(
-            f"start {start}, duration {duration} s, reference {reference} rad: finite, and duration >= 0"
-        )
+def _rows(count: int, duration: float, sampling: Sampling) -> FloatArray:
+    if not (is_number(duration) and duration >= 0):
+        raise ModelError(f"duration is {duration!r}: a finite number of seconds >= 0 (eqs 5-7, as sampled)")
     return np.empty((count, math.floor(duration / sampling.period * (1 + 1e-12)) + 1))
 
 

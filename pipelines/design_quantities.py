@@ -93,13 +93,7 @@ def decay_rates(
     moving: OneLinkRobot, controller: Controller, drawn: list[OneLinkRobot]
 ) -> dict[str, Quantity]:
     """L - L_c of the robot as it moves (negative: errors grow), and the decay without observer error."""
-    L = controller.gains.observer
-    rate = observer_error_decay(moving, L)
-    error = (
-        Quantity(None, "1/s", withheld="beta < 1: no observer gain makes the error contract")
-        if math.isinf(rate)
-        else Quantity(rate, "1/s", interval95=_interval([observer_error_decay(one, L) for one in drawn]))
-    )
+    error = _error_decay(moving, controller.gains.observer, drawn)
     return {"observer_error": error, "loop": Quantity(loop_decay(controller).rate, "1/s")}
 
 
@@ -122,6 +116,15 @@ def rests_beside_the_cycle(
 def _largest_rests(moving: OneLinkRobot, controller: Controller) -> dict[str, float]:
     found = largest_compensation_with_rest(moving, controller)
     return {"positive": found.positive.r, "negative": found.negative.r, "r_max": found.r_max}
+
+
+def _error_decay(moving: OneLinkRobot, L: float, drawn: list[OneLinkRobot]) -> Quantity:
+    if L == 0.0:
+        return Quantity(None, "1/s", withheld="L = 0: the decay of the observer error needs L > 0 (eq 17)")
+    rate = observer_error_decay(moving, L)
+    if math.isinf(rate):
+        return Quantity(None, "1/s", withheld="beta < 1: no observer gain makes the error contract")
+    return Quantity(rate, "1/s", interval95=_interval([observer_error_decay(one, L) for one in drawn]))
 
 
 def threshold_values(robot: OneLinkRobot) -> dict[str, dict[str, float | None]]:

@@ -19,6 +19,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ident.model.numbers import is_number, real_array, shown
+
 STEEPEST_SHAPE: Final = 100.0
 
 
@@ -42,8 +44,8 @@ class StribeckCurve:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not math.isfinite(value):
-                raise ModelError(f"{field.name} is {value}: a friction parameter is a finite number (eq 3)")
+            if not is_number(value):
+                raise ModelError(f"{field.name} is {value!r}: a friction parameter is a finite number (eq 3)")
         if self.coulomb_torque < 0:
             raise ModelError(f"coulomb_torque is {self.coulomb_torque:g} N m: F_c >= 0 (eq 3)")
         if self.static_torque < self.coulomb_torque:
@@ -69,8 +71,13 @@ class StribeckCurve:
         return self.static_torque - self.coulomb_torque
 
     def dry(self, speed: ArrayLike) -> NDArray[np.float64]:
-        """Dry friction magnitude g(s) [N m] at speeds s >= 0 [rad/s], any shape; F_s at 0. Eq (3)."""
-        s = np.asarray(speed, dtype=np.float64)
+        """Dry friction magnitude g(s) [N m] at speeds s >= 0 [rad/s], any shape; F_s at 0. Eq (3).
+
+        Raises `ModelError` for what is no speed.
+        """
+        s = real_array(speed)
+        if s is None or not np.all(s >= 0.0):
+            raise ModelError(f"speed is {shown(speed)}: a magnitude s >= 0 [rad/s] (eq 3)")
         with np.errstate(over="ignore", under="ignore"):  # (s/v_s)^beta may be infinite: exp(-inf) is 0
             fading = np.exp(-((s / self.stribeck_velocity) ** self.stribeck_shape))
         return self.coulomb_torque + self.stribeck_torque * fading
@@ -91,10 +98,12 @@ class StribeckCurve:
 
 
 def steepest_fall_factor(shape: float) -> float:
-    """eta of eq (13), for a Stribeck shape beta > 0; infinite for beta < 1.
+    """eta of eq (13), for a Stribeck shape beta > 0, else `ModelError`; infinite for beta < 1.
 
     With y = (s / v_s)^beta, -dg/ds = (dF / v_s) beta y^((beta-1)/beta) e^-y peaks at y = (beta-1)/beta.
     """
+    if not (is_number(shape) and shape > 0.0):
+        raise ModelError(f"shape is {shape!r}: beta > 0 (eq 13)")
     if shape < 1.0:
         return math.inf
     if shape == 1.0:
@@ -110,6 +119,12 @@ class StribeckFriction:
     positive: StribeckCurve
     negative: StribeckCurve
 
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            curve = getattr(self, field.name)
+            if not isinstance(curve, StribeckCurve):
+                raise ModelError(f"{field.name} is {curve!r}: a StribeckCurve for that direction (eqs 2-4)")
+
     @classmethod
     def symmetric(cls, curve: StribeckCurve) -> StribeckFriction:
         """One curve for both directions, as the paper uses it from section 3 on."""
@@ -118,9 +133,12 @@ class StribeckFriction:
     def torque_interval(self, velocity: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Lowest and highest dry friction torque [N m] at velocities of any shape [rad/s]. Eqs (2), (4).
 
-        The two agree wherever the link moves; at rest they are (-F_s(negative), F_s(positive)).
+        The two agree wherever the link moves; at rest they are (-F_s(negative), F_s(positive)). Raises
+        `ModelError` for what is no velocity.
         """
-        v = np.asarray(velocity, dtype=np.float64)
+        v = real_array(velocity)
+        if v is None or np.any(np.isnan(v)):
+            raise ModelError(f"velocity is {shown(velocity)}: real numbers [rad/s] (eqs 2-4)")
         forward, backward = self.positive.dry(np.abs(v)), -self.negative.dry(np.abs(v))
         return np.where(v > 0, forward, backward), np.where(v < 0, backward, forward)
 

@@ -5,22 +5,27 @@ The viscous damping b stands in the curve of each direction, as Table 1 prints i
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from ident.model.friction import ModelError, StribeckFriction
+from ident.model.numbers import is_number
 
 
 @dataclass(frozen=True)
 class OneLinkRobot:
-    """An inertia under set-valued friction; also what a compensator believes the robot to be."""
+    """An inertia under set-valued friction; also what a compensator believes the robot to be.
+
+    Raises `ModelError` for an inertia that nothing can have.
+    """
 
     inertia: float  # J [kg m^2]
     friction: StribeckFriction
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.inertia) and self.inertia > 0):
-            raise ModelError(f"inertia is {self.inertia:g} kg m^2: J > 0 (eq 1)")
+        if not (is_number(self.inertia) and self.inertia > 0):
+            raise ModelError(f"inertia is {self.inertia!r} kg m^2: a finite J > 0 (eq 1)")
+        if not isinstance(self.friction, StribeckFriction):
+            raise ModelError(f"friction is {self.friction!r}: a StribeckFriction (eqs 2-4)")
 
     def mean(self) -> OneLinkRobot:
         """The symmetric robot with the means of the two directions."""

@@ -9,8 +9,8 @@ from typing import TypeVar
 import numpy as np
 import pytest
 
-from compensation.controller import Controller, Gains
-from compensation.sampled_bifurcation import sampled_cycles, settling_time, with_gain
+from compensation.controller import Controller, Gains, with_gain
+from compensation.sampled_bifurcation import sampled_cycles, settling_time
 from compensation.sampled_loop import Sampling
 from ident.model.published import asymmetric_robot, symmetric_robot
 

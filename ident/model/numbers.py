@@ -1,0 +1,44 @@
+"""What counts as a number at the door of a public function.
+
+Values that come from outside may be words, None, complex or not finite. The functions that take them ask
+here, and say by a `ModelError` of their own which argument it is, which rule it breaks and where that stands.
+"""
+
+from __future__ import annotations
+
+import math
+import reprlib
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+_SCALARS: Final = (float, int, np.floating, np.integer)
+_KINDS: Final = "fiu"  # of numpy's types: no words, no complex numbers, no objects
+
+
+def is_number(value: object) -> bool:
+    """Whether a value is one finite real number that a float can hold."""
+    try:
+        return isinstance(value, _SCALARS) and not isinstance(value, bool) and math.isfinite(value)
+    except OverflowError:  # an int beyond every float
+        return False
+
+
+def is_count(value: object) -> bool:
+    """Whether a value is a whole number."""
+    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+
+
+def real_array(values: ArrayLike) -> NDArray[np.float64] | None:
+    """Real numbers of any shape, nan and inf included, as a copy; None for words, objects, ragged rows."""
+    try:
+        found = np.asarray(values)
+    except ValueError:
+        return None
+    return np.array(found, dtype=np.float64, order="C") if found.dtype.kind in _KINDS else None
+
+
+def shown(value: object) -> str:
+    """A value in a message: shortened where it is long, on one line."""
+    return " ".join(reprlib.repr(value).split())
