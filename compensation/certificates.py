@@ -34,7 +34,7 @@ import numpy as np
 
 from compensation.controller import Controller
 from compensation.design_criteria import critical_observer_gains, loop_decay
-from compensation.equilibria import DIRECTIONS, Direction, equilibrium_set
+from compensation.equilibria import DIRECTIONS, Direction, curve_of, equilibrium_set
 from ident.model.friction import StribeckFriction
 from ident.model.robot import OneLinkRobot
 
@@ -176,9 +176,8 @@ def _loop(controller: Controller, law: str) -> tuple[Certificate, Certificate]:
 def _static_statements(
     robot: OneLinkRobot, controller: Controller, direction: Direction, law: str
 ) -> tuple[Certificate, ...]:
-    true, believed = robot.friction, controller.model.friction
-    held = (true.positive if direction == "positive" else true.negative).static_torque
-    known = (believed.positive if direction == "positive" else believed.negative).static_torque
+    held = curve_of(robot.friction, direction).static_torque
+    known = curve_of(controller.model.friction, direction).static_torque
     excess = controller.gains.compensation * known - held
     return (
         _local_contraction(robot, controller, direction, law),

@@ -21,14 +21,15 @@ The edges are roots of a scalar function: see `torque_balance`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
+from numpy.typing import ArrayLike
+
 from compensation.controller import Controller, with_gain
 from compensation.torque_balance import TorqueBalance
-from ident.model.friction import ModelError
-from ident.model.numbers import is_number
+from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
+from ident.model.numbers import is_number, real_array, shown
 from ident.model.robot import OneLinkRobot
 
 Direction = Literal["positive", "negative"]
@@ -104,13 +105,23 @@ def equilibrium_set(robot: OneLinkRobot, controller: Controller) -> EquilibriumS
 
 
 def equilibrium_sets(
-    robot: OneLinkRobot, controller: Controller, *, parameter: Literal["r", "L"], values: Iterable[float]
+    robot: OneLinkRobot, controller: Controller, *, parameter: Literal["r", "L"], values: ArrayLike
 ) -> tuple[EquilibriumSet, ...]:
-    """The sets over a sweep of r or of L [1/s], the other gains as in `controller`: figures 4, 8 and 9.
+    """The sets at `values` (n,) of r or of L [1/s], the other gains as in `controller`: figures 4, 8 and 9.
 
     Raises `ModelError` for another parameter, or a value that is no gain.
     """
-    return tuple(equilibrium_set(robot, with_gain(controller, parameter, value)) for value in values)
+    grid = real_array(values)
+    if grid is None or grid.ndim != 1:
+        raise ModelError(f"values of {parameter} are {shown(values)}: a list of numbers (eqs 9-10)")
+    return tuple(equilibrium_set(robot, with_gain(controller, parameter, value)) for value in grid.tolist())
+
+
+def curve_of(friction: StribeckFriction, direction: Direction) -> StribeckCurve:
+    """The curve of one direction; `ModelError` for another word."""
+    if direction not in DIRECTIONS:
+        raise ModelError(f"direction is {direction!r}: 'positive' or 'negative', the sign of x2 (eqs 9-10)")
+    return friction.positive if direction == "positive" else friction.negative
 
 
 def torque_balance(robot: OneLinkRobot, controller: Controller, direction: Direction) -> TorqueBalance:
@@ -118,11 +129,7 @@ def torque_balance(robot: OneLinkRobot, controller: Controller, direction: Direc
 
     Raises `ModelError` for another word than a direction.
     """
-    if direction not in DIRECTIONS:
-        raise ModelError(f"direction is {direction!r}: 'positive' or 'negative', the sign of x2 (eqs 9-10)")
-    true = robot.friction.positive if direction == "positive" else robot.friction.negative
-    model = controller.model.friction
-    believed = model.positive if direction == "positive" else model.negative
+    true, believed = curve_of(robot.friction, direction), curve_of(controller.model.friction, direction)
     r = controller.gains.compensation
     return TorqueBalance(
         slope=believed.viscous_damping + controller.gains.observer * controller.model.inertia,
@@ -135,7 +142,7 @@ def torque_balance(robot: OneLinkRobot, controller: Controller, direction: Direc
 
 def _segment(controller: Controller, direction: Direction, low: float, high: float) -> Segment:
     model, gains = controller.model, controller.gains
-    believed = model.friction.positive if direction == "positive" else model.friction.negative
+    believed = curve_of(model.friction, direction)
     stiffness = gains.observer * model.inertia + believed.viscous_damping + gains.derivative
     near = stiffness * low / gains.proportional
     far = stiffness * high / gains.proportional if stiffness > 0.0 else 0.0  # inf x 0 where nothing resists

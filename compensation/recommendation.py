@@ -26,9 +26,9 @@ import numpy as np
 
 from compensation.controller import Controller, Gains
 from compensation.design_criteria import critical_observer_gains, loop_decay
-from compensation.equilibria import DIRECTIONS, Direction, equilibrium_set
+from compensation.equilibria import DIRECTIONS, Direction, curve_of, equilibrium_set
 from ident.model.friction import ModelError, StribeckFriction
-from ident.model.numbers import is_number
+from ident.model.numbers import is_number, is_number_or_inf
 from ident.model.robot import OneLinkRobot
 
 Law = Literal["per-direction", "mean"]
@@ -59,7 +59,7 @@ class ThresholdEnds:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not (value == math.inf or (is_number(value) and value >= 0.0)):
+            if not (is_number_or_inf(value) and value >= 0.0):
                 raise ModelError(
                     f"{field.name} threshold is {value!r}: r >= 0, inf where nothing limits it (eq 6)"
                 )
@@ -90,7 +90,7 @@ def recommend(
     for name, gain in (("proportional", proportional), ("derivative", derivative)):
         if gain is not None and not is_number(gain):
             raise ModelError(f"{name} gain is {gain!r}: a finite number (eq 5)")
-    if not (worst_gain_high is None or worst_gain_high == math.inf or is_number(worst_gain_high)):
+    if worst_gain_high is not None and not is_number_or_inf(worst_gain_high):
         raise ModelError(
             f"worst_gain_high is {worst_gain_high!r} 1/s: a number, inf where no gain is enough (eq 11)"
         )
@@ -187,17 +187,13 @@ def _weaker(limits: dict[Direction, float]) -> Direction:
 
 def static_ratio(robot: OneLinkRobot, model: OneLinkRobot, direction: Direction) -> float:
     """F_s / F_s^ of a direction [-]: the r at which equilibria cease to touch the set point."""
-    true, believed = robot.friction, model.friction
-    if direction == "positive":
-        held, applied = true.positive.static_torque, believed.positive.static_torque
-    else:
-        held, applied = true.negative.static_torque, believed.negative.static_torque
+    held = curve_of(robot.friction, direction).static_torque
+    applied = curve_of(model.friction, direction).static_torque
     return held / applied if applied > 0.0 else math.inf
 
 
 def _threshold(true: StribeckFriction, model: StribeckFriction, direction: Direction) -> float:
-    own = true.positive if direction == "positive" else true.negative
-    believed = model.positive if direction == "positive" else model.negative
+    own, believed = curve_of(true, direction), curve_of(model, direction)
     speeds = _SPEEDS * max(own.stribeck_velocity, believed.stribeck_velocity)
     applied = believed.dry(speeds)
     ratios = own.dry(speeds)[applied > 0.0] / applied[applied > 0.0]

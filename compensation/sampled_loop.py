@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from compensation.controller import Controller
 from compensation.observer import euler_change, exact_change
 from ident.model.friction import ModelError
-from ident.model.numbers import is_count, is_number, real_array, shown
+from ident.model.numbers import is_count, is_number, is_number_or_inf, real_array, shown
 from ident.model.robot import OneLinkRobot
 from ident.response import NO_RIPPLE, TorqueRipple, advance_with_ripple, law_array, plant_array
 from ident.simulation.compiled import compiled, owning
@@ -75,7 +75,7 @@ class Sampling:
             raise ModelError(f"observer_update is {self.observer_update!r}: 'euler' or 'exact', for eq (7)")
         if not (is_count(self.delay) and self.delay >= 0):
             raise ModelError(f"delay is {self.delay!r}: a whole number of samples >= 0 (eqs 5-7, as sampled)")
-        if not (self.torque_limit == math.inf or (is_number(self.torque_limit) and self.torque_limit > 0)):
+        if not (is_number_or_inf(self.torque_limit) and self.torque_limit > 0):
             raise ModelError(
                 f"torque limit is {self.torque_limit!r} N m: > 0, inf for none (eqs 5-7, as sampled)"
             )

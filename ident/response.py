@@ -19,13 +19,14 @@ over a sample period, like the torque that it adds to.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final, Literal
 
 import numpy as np
 
 from data.recording import FloatArray
 from ident.model.friction import ModelError
+from ident.model.numbers import is_number
 from ident.model.robot import OneLinkRobot
 from ident.near_rest import slip_near_rest, speed_limit
 from ident.simulation.compiled import compiled, owning
@@ -60,11 +61,20 @@ def law_array(robot: OneLinkRobot) -> FloatArray:
 
 @dataclass(frozen=True)
 class TorqueRipple:
-    """A torque amplitude x sin(harmonic x q + phase) that acts beside the motor's; none by default."""
+    """A torque amplitude x sin(harmonic x q + phase) that acts beside the motor's; none by default.
+
+    Raises `ModelError` for what is no number.
+    """
 
     amplitude: float = 0.0  # [N m]
     harmonic: float = 0.0  # [1/rad]: periods in a revolution
     phase: float = 0.0  # [rad]
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not is_number(value):
+                raise ModelError(f"ripple {field.name} is {value!r}: a finite number (u of eq 1)")
 
 
 NO_RIPPLE: Final = TorqueRipple()

@@ -25,6 +25,11 @@ def is_number(value: object) -> bool:
         return False
 
 
+def is_number_or_inf(value: object) -> bool:
+    """Whether a value is a number or +inf: a bound, which may be none."""
+    return is_number(value) or (isinstance(value, float) and value == math.inf)
+
+
 def is_count(value: object) -> bool:
     """Whether a value is a whole number."""
     return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
