@@ -13,6 +13,7 @@ from ident.model.friction import StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
+from tests.bad_values import each_refused, refused
 
 
 def section(r: float, observer: float = 73.5, robot: OneLinkRobot | None = None) -> LoopSection:
@@ -151,3 +152,9 @@ def test_with_gain_changes_one_gain() -> None:
     loop = section(1.0).loop
     assert with_gain(loop, "L", 50.0).controller.gains == replace(loop.controller.gains, observer=50.0)
     assert with_gain(loop, "r", 0.9).controller.gains == replace(loop.controller.gains, compensation=0.9)
+
+
+def test_only_gains_are_changed() -> None:
+    loop = section(1.0).loop
+    each_refused(with_gain, {"loop": loop, "parameter": "r", "value": 1.0}, {"parameter": ("z", None)})
+    refused(lambda: with_gain(loop, "n1", 0.0), "proportional gain")
