@@ -35,6 +35,7 @@ from compensation.rest_pieces import (
     rest_pieces,
 )
 from ident.model.friction import ModelError
+from ident.model.numbers import real_array, shown
 from ident.simulation.filippov_system import FloatArray
 
 Kind = Literal["equilibrium_set", "equilibrium", "limit_cycle"]
@@ -91,10 +92,14 @@ def diagram(loop: ClosedLoop, parameter: Parameter, values: ArrayLike) -> Diagra
         If the parameter is unknown, or the values are no ascending finite numbers >= 0.
     """
     if parameter not in ("r", "L"):
-        raise ModelError(f"parameter is {parameter!r}: a diagram is drawn over 'r' or 'L'")
-    grid = np.asarray(values, dtype=np.float64)
-    if grid.ndim != 1 or grid.size == 0 or not np.all(np.isfinite(grid)) or np.any(np.diff(grid) <= 0):
-        raise ModelError(f"values of {parameter} must be finite and ascending")
+        raise ModelError(f"parameter is {parameter!r}: a diagram is drawn over 'r' or 'L' (eqs 6-7)")
+    grid = real_array(values)
+    if grid is None or grid.ndim != 1 or grid.size == 0 or not np.isfinite(grid).all():
+        raise ModelError(f"values of {parameter} are {shown(values)}: a list of finite numbers (eqs 6-7)")
+    backwards = np.flatnonzero(np.diff(grid) <= 0)
+    if backwards.size:
+        one, other = grid[backwards[0] : backwards[0] + 2]
+        raise ModelError(f"values of {parameter} must ascend: {other:g} follows {one:g} (eqs 6-7)")
     with_gain(loop, parameter, float(grid[0]))  # refuses what is no gain
     chains = cut_at_jumps(loop, parameter, grid, chained(stable_cycles(loop, parameter, grid)))
     cycles = [_cycle_branch(chain, grid) for chain in chains]

@@ -32,16 +32,16 @@ def is_number_or_inf(value: object) -> bool:
 
 def is_count(value: object) -> bool:
     """Whether a value is a whole number."""
-    return isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    return isinstance(value, (int, np.integer)) and is_number(value)
 
 
 def real_array(values: ArrayLike) -> NDArray[np.float64] | None:
     """Real numbers of any shape, nan and inf included, as a copy; None for words, objects, ragged rows."""
     try:
-        found = np.asarray(values)
+        found = np.array(values, order="C")
     except ValueError:
         return None
-    return np.array(found, dtype=np.float64, order="C") if found.dtype.kind in _KINDS else None
+    return found.astype(np.float64, copy=False) if found.dtype.kind in _KINDS else None
 
 
 def shown(value: object) -> str:

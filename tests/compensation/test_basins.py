@@ -16,6 +16,7 @@ from ident.model.friction import ModelError
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
+from tests.bad_values import NO_ARRAYS, each_refused
 
 
 def loop(r: float, observer: float = 73.5, robot: OneLinkRobot | None = None) -> ClosedLoop:
@@ -99,3 +100,10 @@ def test_a_start_that_has_not_settled_is_undecided() -> None:
 def test_bad_rectangles_are_named(x1: tuple[float, float], cells: tuple[int, int], said: str) -> None:
     with pytest.raises(ModelError, match=said):
         Rectangle(x1, (-1.0, 1.0), cells)
+
+
+def test_what_is_no_number_is_refused_by_name() -> None:
+    given = {"x1": (0.0, 1.0), "velocity": (0.0, 1.0), "cells": (2, 2)}
+    spans = (*NO_ARRAYS, 1.0, (0.0, 1.0, 2.0), (0.0, np.inf), (1.0, 1.0))
+    bad = {"x1": spans, "velocity": spans, "cells": (2, None, "22", (2,), (2.0, 2), (2, -1), (2, 2, 2))}
+    each_refused(Rectangle, given, bad)

@@ -93,3 +93,31 @@ def test_law_gap_is_the_largest_difference() -> None:
     robot = asymmetric_robot()
     assert law_gap(robot.friction, robot.friction) == 0.0
     assert law_gap(robot.friction, robot.mean().friction) == pytest.approx(0.0306, abs=1e-4)
+
+
+@pytest.mark.parametrize("damping", [0.0809, 5.0])
+def test_without_an_observer_gain_nothing_is_certified(damping: float) -> None:
+    """Also where damping alone would make errors contract: the theorem asks for L > 0."""
+    curve = replace(symmetric_robot().friction.positive, viscous_damping=damping)
+    robot = OneLinkRobot(0.026, StribeckFriction.symmetric(curve))
+    without = certificates(robot, Controller(gains(L=0.0), robot), law="mean")
+    for start in ("contraction", "local contraction: L > L_c (positive)", "L > L_c(mean)", "theorem"):
+        found = named(without, start)
+        assert not found.holds
+        assert found.margin is not None
+        assert found.margin <= 0.0
+        assert "needs L > 0" in found.says
+    assert not named(without, "(a)").holds
+    enough = certificates(robot, Controller(gains(L=80.0), robot), law="mean")
+    assert named(enough, "theorem").holds
+
+
+@pytest.mark.parametrize("r", [1.0 + 1e-6, 1.0 - 1e-12])
+def test_a_hypothesis_that_fails_by_little_says_so(r: float) -> None:
+    robot = symmetric_robot()
+    says = named(certificates(robot, Controller(gains(80.0, r), robot), law="mean"), "r = 1").says
+    assert says == f"r = {r}: e = 0 is no solution"
+    short = certificates(robot, Controller(gains(73.07), robot), law="mean")
+    says = named(short, "contraction").says  # L_c = 73.0704
+    assert says.startswith("L = 73.07 1/s is 0.0004")
+    assert "short of 73.07 1/s" in says

@@ -13,6 +13,7 @@ from compensation.controller import Controller, Gains
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
+from tests.bad_values import NO_ARRAYS, NO_NUMBERS, each_refused, refused
 from tests.compensation.independent_solvers import piecewise, time_stepping
 from tests.strategies import controllers, robots
 
@@ -314,3 +315,19 @@ def test_bad_input_is_named(arguments: dict[str, object], said: str) -> None:
     given: dict[str, object] = {"start": START, "duration": 3.0, **arguments}
     with pytest.raises(ModelError, match=said):
         simulate(loop(1.0), **given)  # type: ignore[arg-type]  # wrong on purpose
+
+
+def test_what_is_no_number_is_refused_by_name() -> None:
+    case = loop(1.0)
+    given = {"loop": case, "start": START, "duration": 3.0, "times": None, "tolerance": 1e-9}
+    bad = {
+        "start": (*NO_ARRAYS, 1.0, []),
+        "duration": (*NO_NUMBERS, math.inf, 0.0),
+        "times": (*(value for value in NO_ARRAYS if value is not None), 1.0, [[1.0]], [math.nan], [-1.0]),
+        "tolerance": (*NO_NUMBERS, 1.0, -1e-9),
+    }
+    each_refused(simulate, given, bad)
+    refused(lambda: simulate(case, START, duration=3.0, times=[0.0, 2.0, 1.0]), "times[2] is 1 s", "ascend")
+    each_refused(torque, {"loop": case}, {"states": (*NO_ARRAYS, [math.nan] * 3, [[1.0, 0.0]])})
+    parts = {"robot": case.robot, "controller": case.controller}
+    each_refused(ClosedLoop, parts, {"robot": (None, case.controller), "controller": (None, case.robot)})

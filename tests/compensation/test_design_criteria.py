@@ -23,6 +23,7 @@ from compensation.design_criteria import (
 from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
+from tests.bad_values import NO_ARRAYS, NO_NUMBERS, each_refused, refused
 from tests.strategies import robots, stribeck_curves
 
 PAPER = Gains(0.4, 0.02, observer=73.5, compensation=1.0)
@@ -114,3 +115,16 @@ def test_a_damped_direction_is_never_left() -> None:
     assert found.rate == -found.positive[0].real < -found.positive[1].real
     product = found.positive[0] * found.positive[1]
     assert product == pytest.approx(PAPER.proportional / robot.inertia)
+
+
+def test_what_is_no_number_is_refused_by_name() -> None:
+    robot = symmetric_robot()
+    curve = robot.friction.positive
+    each_refused(critical_observer_gain, {"curve": curve}, {"inertia": (*NO_NUMBERS, -1.0, 0.0, math.inf)})
+    each_refused(
+        observer_error_decay, {"robot": robot}, {"observer_gain": (*NO_NUMBERS, -5.0, 0.0, math.inf)}
+    )
+    given = {"friction": robot.friction, "x2": 0.1, "x3": 0.1}
+    bad = (*NO_ARRAYS, math.nan, [math.inf])
+    each_refused(sector_slack, given, {"x2": bad, "x3": bad})
+    refused(lambda: sector_slack(robot.friction, [0.1, 0.2], [0.1, 0.2, 0.3]), "x2", "x3", "shape")

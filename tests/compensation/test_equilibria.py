@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 
 from compensation.controller import Controller, Gains
-from compensation.equilibria import EquilibriumSet, equilibrium_set, equilibrium_sets
+from compensation.equilibria import EquilibriumSet, equilibrium_set, equilibrium_sets, torque_balance
 from ident.model.friction import StribeckFriction
 from ident.model.published import DERIVATIVE_GAIN, PROPORTIONAL_GAIN, asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
+from tests.bad_values import NO_ARRAYS, NO_NUMBERS, each_refused, refused
 from tests.strategies import controllers, robots
 
 
@@ -126,3 +129,17 @@ def test_a_sweep_is_its_single_sets() -> None:
         of(1.0, 80.0),
     )
     assert equilibrium_sets(robot, controller, parameter="r", values=[0.9]) == (of(0.9, 40.0),)
+
+
+def test_what_is_no_sweep_is_refused_by_name() -> None:
+    robot = symmetric_robot()
+    given = {"robot": robot, "controller": Controller(gains(1.0, 40.0), robot)}
+    each_refused(torque_balance, given, {"direction": ("up", None, 1)})
+    sweep: dict[str, Any] = {**given, "parameter": "r", "values": [1.0]}
+    bad = {"parameter": ("z", "l", None, 1), "values": (*NO_ARRAYS, 1.0)}
+    each_refused(equilibrium_sets, sweep, bad)
+    each_refused(equilibrium_sets, sweep, {"values": []})
+    for value in (-1.0, np.nan, np.inf):
+        refused(partial(equilibrium_sets, **{**sweep, "values": [0.5, value]}), "compensation gain")
+    place = {"position": 0.1, "tolerance": 0.0}
+    each_refused(of(1.0, 40.0).contains, place, {"position": NO_NUMBERS, "tolerance": (*NO_NUMBERS, -1.0)})

@@ -17,6 +17,7 @@ from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
+from tests.bad_values import each_refused, refused
 
 
 def section(r: float, observer: float = 73.5, robot: OneLinkRobot | None = None) -> LoopSection:
@@ -197,3 +198,9 @@ def test_a_motion_that_comes_to_rest_has_no_derivative() -> None:
     start = np.array([0.13472966548222248, -0.0006825877034719243])
     assert where.derivative(start) is None
     assert where.follow(start, 1).end_reason == "equilibrium"
+
+
+def test_only_gains_are_changed() -> None:
+    loop = section(1.0).loop
+    each_refused(with_gain, {"loop": loop, "parameter": "r", "value": 1.0}, {"parameter": ("z", None)})
+    refused(lambda: with_gain(loop, "n1", 0.0), "proportional gain")

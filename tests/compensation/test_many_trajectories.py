@@ -13,6 +13,7 @@ from compensation.many_trajectories import simulate_many
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.published import symmetric_robot
 from ident.model.robot import OneLinkRobot
+from tests.bad_values import NO_ARRAYS, NO_NUMBERS, each_refused, refused
 
 GAINS = Gains(proportional=0.4, derivative=0.02, observer=73.5, compensation=1.1)
 LOOP = ClosedLoop(symmetric_robot(), Controller(GAINS, symmetric_robot()))
@@ -94,3 +95,28 @@ def test_bad_input_is_named() -> None:
         simulate_many(LOOP, STARTS, duration=1.0, gains=0.0 * ROWS)
     with pytest.raises(ModelError, match="tolerance"):
         simulate_many(LOOP, STARTS, duration=1.0, tolerance=0.0)
+
+
+def test_what_is_no_number_is_refused_by_name() -> None:
+    given = {"loop": LOOP, "starts": STARTS, "duration": 1.0, "times": (), "gains": ROWS}
+    bad = {
+        "starts": NO_ARRAYS,
+        "duration": (*NO_NUMBERS, np.inf, 0.0),
+        "times": (*NO_ARRAYS, [np.nan], [1.0, 0.5], [2.0]),
+        "gains": (*(value for value in NO_ARRAYS if value is not None), ROWS[:, :3]),
+        "tolerance": (*NO_NUMBERS, 1.0),
+        "parts": (0, -1, 1.5, "1", None, np.nan),
+    }
+    each_refused(simulate_many, given, bad)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "name"),
+    [(0, 0.0, "proportional"), (1, -1.0, "derivative"), (2, np.nan, "observer"), (3, np.inf, "compensation")],
+)
+def test_the_trajectory_and_its_gain_are_named(column: int, value: float, name: str) -> None:
+    rows, starts = ROWS.copy(), STARTS.copy()
+    rows[4, column] = value
+    refused(lambda: simulate_many(LOOP, STARTS, duration=1.0, gains=rows), "gains[4]", f"{name} gain is")
+    starts[5, 1] = np.nan
+    refused(lambda: simulate_many(LOOP, starts, duration=1.0), "starts[5]")

@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 from compensation.controller import Controller, Gains
 from compensation.design_criteria import critical_observer_gains
 from compensation.equilibria import equilibrium_set
-from compensation.recommendation import ThresholdEnds, overcompensation_thresholds, recommend
+from compensation.recommendation import ThresholdEnds, overcompensation_thresholds, recommend, static_ratio
 from ident.model.friction import StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
+from tests.bad_values import NO_NUMBERS, each_refused
 from tests.strategies import robots
 
 
@@ -81,3 +82,14 @@ def test_an_infinitely_steep_law_has_no_observer_gain() -> None:
     )
     assert only.observer_gain is None
     assert "beta < 1" in only.why
+
+
+def test_what_is_no_number_is_refused_by_name() -> None:
+    given = {"robot": symmetric_robot(), "proportional": 0.4, "derivative": 0.02}
+    words = tuple(value for value in NO_NUMBERS if value is not None)
+    bad = {"proportional": (*words, 0.0, -1.0), "derivative": (*words, -1.0), "worst_gain_high": words}
+    each_refused(recommend, given, bad)
+    ends = {"per_direction": 0.9, "mean": 0.9}
+    each_refused(ThresholdEnds, ends, {"per_direction": (*NO_NUMBERS, -1.0), "mean": (*NO_NUMBERS, -1.0)})
+    pair = {"robot": symmetric_robot(), "model": symmetric_robot()}
+    each_refused(static_ratio, pair, {"direction": ("up", None)})

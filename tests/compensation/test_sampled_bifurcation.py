@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from typing import TypeVar
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from compensation.controller import Controller, Gains, with_gain
 from compensation.sampled_bifurcation import sampled_cycles, settling_time
 from compensation.sampled_loop import Sampling
 from ident.model.published import asymmetric_robot, symmetric_robot
+from tests.bad_values import NO_ARRAYS, each_refused, refused
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -70,3 +72,13 @@ def test_runs_last_many_turns() -> None:
     turn = 2 * math.pi * math.sqrt(robot.inertia / GAINS.proportional)
     assert settling_time(robot, Controller(GAINS, robot)) == pytest.approx(40 * turn)
     assert np.isfinite(settling_time(robot, Controller(Gains(1e-3, 0.0, 1.0, 1.0), robot)))
+
+
+def test_what_is_no_sweep_is_refused_by_name() -> None:
+    robot = symmetric_robot()
+    given = {"robot": robot, "controller": Controller(GAINS, robot), "sampling": RIG}
+    sweep: dict[str, Any] = {**given, "parameter": "r", "values": [1.0]}
+    bad = {"parameter": ("z", None), "values": (*NO_ARRAYS, 1.0, [], [1.1, 1.0], [1.0, math.nan, 1.1])}
+    each_refused(sampled_cycles, sweep, bad)
+    for values in ([-1.0, 1.0], [1.0, math.inf], [math.nan]):
+        refused(partial(sampled_cycles, **{**sweep, "values": values}), "compensation gain")

@@ -11,6 +11,7 @@ from compensation.orbits.steady_state import classify
 from compensation.sampled_ends import SampledEnd, sampled_end
 from compensation.sampled_loop import Sampling, run_sampled
 from ident.model.published import asymmetric_robot
+from tests.bad_values import NO_ARRAYS, NO_NUMBERS, each_refused
 
 ROBOT = asymmetric_robot()
 RIG = Sampling(1e-3, 2 * math.pi / 2**18)
@@ -60,3 +61,14 @@ def test_an_unstable_controller_is_undecided_with_its_reason() -> None:
     assert "unstable" in found.state.why
     assert "L h = 10" in found.state.why
     assert found.samples < 100
+
+
+def test_what_is_no_number_is_refused_by_name() -> None:
+    given = {"robot": ROBOT, "controller": controller(1.0), "sampling": RIG, "start": 0.6, "stretches": [1.0]}
+    bad = {
+        "start": (*NO_NUMBERS, math.inf),
+        "stretches": (*NO_ARRAYS, 1.0, [], [0.0], [2.0, 1.0], [math.nan], [math.inf]),
+        "reference": NO_NUMBERS,
+        "most_samples": (0, -1, 1.5, "1", None),
+    }
+    each_refused(sampled_end, given, bad)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from ident.model.friction import ModelError
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
 from ident.response import respond
+from tests.bad_values import NO_ARRAYS, NO_NUMBERS, each_refused, refused
 
 SYMMETRIC, TABLE_1 = symmetric_robot(), asymmetric_robot()
 COUNT = 2 * math.pi / 2**18
@@ -157,3 +160,35 @@ def test_an_unstable_controller_runs_away_and_is_cut_short() -> None:
     assert np.all(np.isfinite(run.torque))
     (position,) = run_many([TABLE_1], [fast], Sampling(1e-2), starts=[(0.6, 0.0)], duration=30.0)
     np.testing.assert_array_equal(np.isfinite(position), np.arange(position.size) < run.time.size)
+
+
+def test_what_is_no_number_is_refused_by_name() -> None:
+    each_refused(Sampling, {}, {"period": (*NO_NUMBERS, math.inf, -1.0)})
+    settings = {
+        "resolution": (*NO_NUMBERS, math.inf),
+        "observer_update": ("rk4", "Euler", None, 1),
+        "delay": (*NO_NUMBERS, 1.5, math.inf),
+    }
+    each_refused(Sampling, {"period": 1e-3}, settings)
+    limits: tuple[Any, ...] = (*NO_NUMBERS, -math.inf)
+    for limit in limits:
+        refused(partial(Sampling, 1e-3, torque_limit=limit), "torque limit")
+    assert Sampling(1e-3, torque_limit=math.inf).torque_limit == math.inf
+    run = {"robot": TABLE_1, "controller": controller(1.0), "sampling": Sampling(1e-3)}
+    given = {**run, "start": (0.6, 0.0), "duration": 1.0}
+    bad = {
+        "start": (*NO_ARRAYS, 0.6, (math.nan, 0.0), (0.6, 0.0, 0.0)),
+        "duration": (*NO_NUMBERS, math.inf, -1.0),
+        "reference": (*NO_NUMBERS, math.inf),
+    }
+    each_refused(run_sampled, given, bad)
+    wrong = (np.empty(3), np.empty((2, 3)), np.empty((1, 3), np.int64), [[0.0]], None)
+    each_refused(LongRun(**run, start=(0.6, 0.0)).fill, {}, {"rows": wrong})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("name", ["robots", "controllers", "starts"])
+def test_no_runs_are_none(name: str) -> None:
+    given = {"robots": [TABLE_1], "controllers": [controller(1.0)], "starts": [(0.6, 0.0)]}
+    each_refused(run_many, {**given, "sampling": Sampling(1e-3), "duration": 1.0}, {name: ([],)})
+    nothing: dict[str, Any] = {"robots": [], "controllers": [], "starts": []}
+    each_refused(run_many, {**nothing, "sampling": Sampling(1e-3), "duration": 1.0}, {"robots": ([],)})

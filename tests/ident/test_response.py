@@ -25,6 +25,7 @@ from ident.response import (
     plant_array,
     respond,
 )
+from tests.bad_values import NO_NUMBERS, each_refused
 from tests.strategies import robots
 
 TABLE_1 = asymmetric_robot()
@@ -252,3 +253,8 @@ def test_refuses_what_no_rig_can_have() -> None:
         respond(TABLE_1, start=(0.0, 0.0), torque=np.array([0.0, math.nan]), period=1e-3)
     with pytest.raises(ModelError, match="ramp rate"):
         breakaway_delay(TABLE_1, direction="positive", ramp_rate=-0.1, travel=1e-3)
+
+
+@pytest.mark.parametrize("name", ["amplitude", "harmonic", "phase"])
+def test_a_ripple_is_made_of_numbers(name: str) -> None:
+    each_refused(TorqueRipple, {}, {name: (*NO_NUMBERS, math.inf)})

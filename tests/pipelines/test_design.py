@@ -223,3 +223,11 @@ def test_what_needs_no_gains_is_designed_without_them(tmp_path: Path) -> None:
     assert advice["observer_gain"] <= usual["observer_gain"]
     assert advice["largest_rest_error"] is None
     assert "not known without the proportional" in advice["why"]
+
+
+def test_without_an_observer_gain_its_decay_is_withheld(tmp_path: Path) -> None:
+    found = written(paper_robot(), tmp_path, replace(GAINS, observer=0.0))
+    assert found["decay_rate"]["observer_error"]["value"] is None
+    assert "needs L > 0 (eq 17)" in found["decay_rate"]["observer_error"]["withheld"]
+    failing = [one["hypothesis"] for one in found["certificates"] if "needs L > 0" in one["says"]]
+    assert any(hypothesis.startswith("theorem") for hypothesis in failing)

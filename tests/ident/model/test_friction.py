@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from ident.model import published
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction, steepest_fall_factor
+from tests.bad_values import NO_ARRAYS, NO_NUMBERS, each_refused
 from tests.strategies import stribeck_curves
 
 CURVE = published.POSITIVE
@@ -83,3 +84,16 @@ def test_the_steepest_shape_is_bounded_and_overflows_nowhere() -> None:
         StribeckCurve(0.6, 0.4, 0.07, 0.1, stribeck_shape=1e9)
     steep = StribeckCurve(0.6, 0.4, 0.07, 0.1, stribeck_shape=100.0)
     np.testing.assert_allclose(steep.dry([0.0, 0.01, 1e3, 1e300]), [0.6, 0.6, 0.4, 0.4])
+
+
+def test_what_is_no_number_is_refused_by_name() -> None:
+    values = {"static_torque": 0.5, "coulomb_torque": 0.4, "stribeck_velocity": 0.1, "viscous_damping": 0.1}
+    for name in values:
+        each_refused(StribeckCurve, values, {name: NO_NUMBERS})
+    each_refused(StribeckCurve, values, {"stribeck_shape": (*NO_NUMBERS, -1.0)})
+    each_refused(CURVE.dry, {}, {"speed": (*NO_ARRAYS, -1.0, [0.1, math.nan])})
+    each_refused(CURVE.total, {}, {"speed": (-1.0,)})
+    each_refused(steepest_fall_factor, {}, {"shape": (*NO_NUMBERS, 0.0, -1.0)})
+    law = StribeckFriction.symmetric(CURVE)
+    each_refused(law.torque_interval, {}, {"velocity": (*NO_ARRAYS, math.nan)})
+    each_refused(StribeckFriction, {"positive": CURVE, "negative": CURVE}, {"negative": (0.4, None)})

@@ -134,7 +134,7 @@ HOSTILE: dict[str, tuple[Callable[[Document], object], str]] = {
     "worded": (lambda d: d["inertia"].update(value="0.026"), "inertia.value: Input should be a valid number"),
     "true": (lambda d: d["inertia"].update(value=True), "inertia.value: Input should be a valid number"),
     "no reason": (lambda d: d["inertia"].update(value=None), "inertia: .*`withheld` must say why"),
-    "no robot": (lambda d: d["inertia"].update(value=-1.0), "inertia is -1 kg m"),
+    "no robot": (lambda d: d["inertia"].update(value=-1.0), "inertia is -1.0 kg m"),
     "law": (lambda d: (d.pop("mean"), d["negative"]["static_torque"].update(value=0.1)), "F_s >= F_c"),
     "jump": (lambda d: (d.pop("mean"), d["positive"]["stribeck_shape"].update(value=1e9)), "beta <= 100"),
     "mean": (
