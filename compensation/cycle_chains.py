@@ -42,6 +42,9 @@ def chained(found: Sequence[Sequence[Cycle]]) -> list[Chain]:
     chains: list[Chain] = []
     for index, cycles in enumerate(found):
         going_on = [chain for chain in chains if chain.last == index - 1]
+        if len(going_on) == len(cycles) == 1 and cycles[0].returns == going_on[0].cycles[-1].returns:
+            going_on[0].cycles.append(cycles[0])  # as nearly always: nothing to compare
+            continue
         pairs = sorted(
             (distance(cycle, chain.cycles[-1]), number, place)
             for number, chain in enumerate(going_on)

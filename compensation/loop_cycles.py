@@ -48,10 +48,10 @@ def stable_cycles(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> l
 def cycle_near(loop: ClosedLoop, parameter: Parameter, value: float, cycle: Cycle) -> Cycle | NoCycle:
     """The cycle at a value of the gain to which another value's cycle leads."""
     found = settled(loop, parameter, value, cycle.point)
-    section = LoopSection(with_gain(loop, parameter, value))
-    if isinstance(found, Cycle) and _has_mirror(found, section):
-        return min(found, mirrored(found, section), key=lambda one: distance(one, cycle))
-    return found
+    if not isinstance(found, Cycle) or not _has_mirror(found, LoopSection(loop)):
+        return found
+    image = mirrored(found, LoopSection(with_gain(loop, parameter, value)))
+    return min(found, image, key=lambda one: distance(one, cycle))
 
 
 def distance(one: Cycle, other: Cycle) -> float:
@@ -138,7 +138,7 @@ def _searched(loop: ClosedLoop, parameter: Parameter, grid: FloatArray) -> list[
 
 def _has_mirror(cycle: Cycle, section: LoopSection) -> bool:
     """Whether the loop is symmetric and the cycle is not."""
-    return section.symmetric and cycle.returns % 2 == 0
+    return cycle.returns % 2 == 0 and section.symmetric
 
 
 def _same(section: LoopSection) -> float:

@@ -46,9 +46,13 @@ def is_exponential(parameters: FloatArray) -> bool:
     return _only_shapes(parameters, 1.0, 1.0)
 
 
+@compiled
 def smallest_shape(parameters: FloatArray) -> float:
     """The smallest Stribeck shape of all slip modes: below 1, friction falls infinitely steeply from rest."""
-    return float(np.min(parameters[:SLIP_MODES, (SHAPE2, SHAPEV)]))
+    least = np.inf
+    for mode in range(SLIP_MODES):
+        least = min(least, parameters[mode, SHAPE2], parameters[mode, SHAPEV])
+    return least
 
 
 @compiled

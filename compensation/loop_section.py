@@ -12,7 +12,6 @@ import numpy as np
 from compensation.closed_loop import ClosedLoop
 from compensation.loop_returns import MOST_HALTS, carry_for, derivative, returns
 from compensation.loop_runs import is_analytic, run_for, smallest_shape
-from compensation.loop_tables import mode_parameters
 from compensation.orbits.periodic_orbits import Returns
 from ident.model.friction import ModelError, StribeckFriction
 from ident.model.robot import OneLinkRobot
@@ -38,9 +37,9 @@ class LoopSection:
         """Whether robot and model are the same in both directions: then a return is half a turn."""
         return _even(self.loop.robot) and _even(self.loop.controller.model)
 
-    @cached_property
+    @property
     def _parameters(self) -> FloatArray:
-        return mode_parameters(self.loop.robot, self.loop.controller)
+        return self.loop.modes
 
     @cached_property
     def by_series(self) -> bool:

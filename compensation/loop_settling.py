@@ -23,7 +23,7 @@ from compensation.loop_returns import (
 )
 from compensation.loop_section import PATIENCE, REPEATS, STILL, LoopSection, with_gain
 from compensation.loop_sweep import CLOSE, TANGENT_TOLERANCE
-from compensation.loop_tables import COLUMN_OF, Parameter, gain_row, laws_of, mode_parameters
+from compensation.loop_tables import COLUMN_OF, Parameter, gain_row, laws_of
 from compensation.orbits.periodic_orbits import (
     MOST_TURNS,
     VANISHED,
@@ -47,7 +47,7 @@ NUMBERS: Final = SLOPE + 4
 
 def settled(loop: ClosedLoop, parameter: Parameter, value: float, start: FloatArray) -> Cycle | NoCycle:
     """The cycle at a value of a gain to which a point (2,) of the section v = 0 leads."""
-    section, parameters = LoopSection(loop), mode_parameters(loop.robot, loop.controller)
+    section = LoopSection(loop)
     if not section.lipschitz:  # repeats too roughly for the kernel
         return find_cycle(LoopSection(with_gain(loop, parameter, value)), start)
     laws, inertia = laws_of(loop.robot, loop.controller)
@@ -55,7 +55,7 @@ def settled(loop: ClosedLoop, parameter: Parameter, value: float, start: FloatAr
     gains[COLUMN_OF[parameter]] = value
     row = np.empty(NUMBERS)
     period = settle(
-        map_kernels(parameters), laws, inertia, gains, section.symmetric,
+        map_kernels(loop.modes), laws, inertia, gains, section.symmetric,
         section.tolerance, PATIENCE, start, row,
     )  # fmt: skip
     if period == NOWHERE:

@@ -160,5 +160,5 @@ def test_a_link_that_halts_without_turning_ends_the_search() -> None:
 def test_bad_input_is_named() -> None:
     with pytest.raises(ModelError, match="'r' or 'L'"):
         diagram(loop(), "n1", [1.0])  # type: ignore[arg-type]  # wrong on purpose
-    with pytest.raises(ModelError, match="ascending"):
+    with pytest.raises(ModelError, match="ascend"):
         diagram(loop(), "r", [1.0, 0.9])
