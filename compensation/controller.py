@@ -15,7 +15,7 @@ from ident.model.friction import ModelError
 from ident.model.numbers import is_number
 from ident.model.robot import OneLinkRobot
 
-SWEPT: Final = {"r": "compensation", "L": "observer"}  # by their symbols: the gains of diagrams
+GAIN_OF: Final = {"n1": "proportional", "n2": "derivative", "L": "observer", "r": "compensation"}  # by symbol
 
 
 @dataclass(frozen=True)
@@ -53,12 +53,10 @@ class Controller:
 
 
 def with_gain(controller: Controller, parameter: str, value: float) -> Controller:
-    """The controller with another r [-] or L [1/s].
+    """The controller with another r [-], L [1/s], n1 [N m/rad] or n2 [N m s/rad].
 
     Raises `ModelError` for another parameter, or a value that is no gain.
     """
-    if parameter not in SWEPT:
-        raise ModelError(
-            f"parameter is {parameter!r}: 'r' or 'L', the gains of the paper's diagrams (eqs 6-7)"
-        )
-    return replace(controller, gains=replace(controller.gains, **{SWEPT[parameter]: value}))
+    if parameter not in GAIN_OF:
+        raise ModelError(f"parameter is {parameter!r}: 'r', 'L', 'n1' or 'n2' (eqs 5-7)")
+    return replace(controller, gains=replace(controller.gains, **{GAIN_OF[parameter]: value}))

@@ -23,10 +23,11 @@ from typing import Final, Literal
 import numpy as np
 
 from compensation.closed_loop import ClosedLoop
+from compensation.controller import GAIN_OF
 from compensation.cycle_ends import CycleEvent, Neighbourhood, crossing, end_of
 from compensation.cycle_modes import Stick, events_of, mode_sequence, stick_phases
 from compensation.loop_cycles import distance, mirrored
-from compensation.loop_section import GAIN_NAMES, LoopSection, with_gain
+from compensation.loop_section import LoopSection, with_gain
 from compensation.orbits.continuation import Curve, CurveEvent, Steps, trace
 from compensation.orbits.cycle_equation import JOINED, CycleEquation
 from compensation.orbits.periodic_orbits import Cycle, cycle_at, find_cycle, shoot
@@ -127,9 +128,9 @@ def cycle_branch(
 
 
 def _checked(loop: ClosedLoop, gain: Gain, span: tuple[float, float]) -> float:
-    if gain not in GAIN_NAMES:
+    if gain not in GAIN_OF:
         raise ModelError(f"gain is {gain!r}: branches are drawn over 'r', 'L', 'n1' or 'n2' (eqs 5-7)")
-    value = float(getattr(loop.controller.gains, GAIN_NAMES[gain]))
+    value = float(getattr(loop.controller.gains, GAIN_OF[gain]))
     low, high = span
     if not (math.isfinite(low) and math.isfinite(high)):
         raise ModelError(f"span of {gain} is {span}: a gain is a finite number (eqs 5-7)")

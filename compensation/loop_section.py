@@ -9,11 +9,12 @@ from typing import Final
 
 import numpy as np
 
+from compensation import controller
 from compensation.closed_loop import ClosedLoop
 from compensation.loop_returns import MOST_HALTS, carry_for, derivative, returns
 from compensation.loop_runs import is_analytic, run_for, smallest_shape
 from compensation.orbits.periodic_orbits import Returns
-from ident.model.friction import ModelError, StribeckFriction
+from ident.model.friction import StribeckFriction
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
 from ident.simulation.integrate import END_REASONS, EQUILIBRIUM, SECTION
@@ -21,7 +22,6 @@ from ident.simulation.integrate import END_REASONS, EQUILIBRIUM, SECTION
 TOLERANCE: Final = 1e-13  # of a step; series lose nothing by it
 TOLERANCE_ELSE: Final = 1e-11  # of a Dormand-Prince step
 REPEATS: Final = 1e-11  # relative distance of points that are the same
-GAIN_NAMES: Final = {"r": "compensation", "L": "observer", "n1": "proportional", "n2": "derivative"}
 STILL: Final = 1e-8  # of x1, by which a link still moves that closes in on the edge of an equilibrium set
 PATIENCE: Final = 200.0  # [s] for one half turn
 
@@ -118,11 +118,7 @@ class LoopSection:
 
 def with_gain(loop: ClosedLoop, parameter: str, value: float) -> ClosedLoop:
     """The same loop with another r, L [1/s], n1 [N m/rad] or n2 [N m s/rad]; `ModelError` for others."""
-    if parameter not in GAIN_NAMES:
-        raise ModelError(f"parameter is {parameter!r}: 'r', 'L', 'n1' or 'n2' (eqs 5-7)")
-    name = GAIN_NAMES[parameter]
-    gains = replace(loop.controller.gains, **{name: value})
-    return replace(loop, controller=replace(loop.controller, gains=gains))
+    return replace(loop, controller=controller.with_gain(loop.controller, parameter, value))
 
 
 def _state(point: FloatArray) -> FloatArray:

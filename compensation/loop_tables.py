@@ -10,7 +10,7 @@ from typing import Final, Literal
 
 import numpy as np
 
-from compensation.controller import Controller
+from compensation.controller import GAIN_OF, Controller
 from compensation.loop_parameters import COLUMNS, ROWS, mode_table
 from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
@@ -18,7 +18,7 @@ from ident.simulation.compiled import compiled
 from ident.simulation.filippov_system import FloatArray
 
 Parameter = Literal["r", "L"]
-GAIN_NAMES: Final = ("proportional", "derivative", "observer", "compensation")
+GAIN_NAMES: Final = tuple(GAIN_OF.values())
 COLUMN_OF: Final[dict[Parameter, int]] = {"L": 2, "r": 3}
 
 
