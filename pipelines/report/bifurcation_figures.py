@@ -23,6 +23,7 @@ from pipelines.report.style import BLUE, INK, MUTED, VERMILLION, new_figure, sty
 _PARAMETER: Final = {"r": "compensation gain $r$", "L": "observer gain $L$ [1/s]"}
 _ROMAN: Final = {"limit_cycle": "(I)", "equilibrium_set": "(II)", "equilibrium": "(III)"}
 _SET_OPACITY: Final = 0.25
+_LABEL_ROOM = 0.1  # of the axis, at its left end, where the name of a bifurcation stands on its right
 _DOTTED: Final = (0, (1.5, 2))
 
 
@@ -46,11 +47,14 @@ def figure9(
             _name(axes, branch)
             named.add(branch.kind)
     values = {f"{diagram.parameter} = {change.value:.4g}": change.value for change in diagram.bifurcations}
+    ends = [point.value for branch in diagram.branches for point in branch.points]
     for number, name in enumerate(values):
+        inwards = -1 if values[name] > min(ends) + _LABEL_ROOM * (max(ends) - min(ends)) else 1
         axes.axvline(values[name], color=INK, linewidth=0.9, linestyle=_DOTTED, zorder=2.5)
         axes.annotate(
-            name, (values[name], 1.0), (-4, -2 - 11 * (number % 3)), xycoords=("data", "axes fraction"),
-            textcoords="offset points", ha="right", va="top", fontsize=8.0, color=MUTED, parse_math=False,
+            name, (values[name], 1.0), (4 * inwards, -2 - 11 * (number % 3)),
+            xycoords=("data", "axes fraction"), textcoords="offset points",
+            ha="right" if inwards < 0 else "left", va="top", fontsize=8.0, color=MUTED, parse_math=False,
         )  # fmt: skip
     unit = units_of(axis).position
     axes.set(
@@ -94,7 +98,8 @@ def _name(axes: Axes, branch: Branch) -> None:
         return
     at = value.size // 3 if branch.kind == "equilibrium_set" else value.size // 2
     wider = low if abs(low[at]) >= abs(high[at]) else high
-    heights = {"limit_cycle": amplitude, "equilibrium_set": 0.5 * wider}
+    inside = 0.5 * wider if low[at] * high[at] <= 0.0 else 0.5 * (low + high)
+    heights = {"limit_cycle": amplitude, "equilibrium_set": inside}
     offsets = {"limit_cycle": (-6, 8), "equilibrium_set": (0, 0)}
     axes.annotate(
         _ROMAN.get(branch.kind, ""), (value[at], heights.get(branch.kind, high)[at]),
