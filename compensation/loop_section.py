@@ -14,6 +14,7 @@ from compensation.loop_returns import MOST_HALTS, carry_for, derivative, returns
 from compensation.loop_runs import is_analytic, run_for, smallest_shape
 from compensation.orbits.periodic_orbits import Returns
 from ident.model.friction import ModelError, StribeckFriction
+from ident.model.numbers import is_one_of, shown
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
 from ident.simulation.integrate import END_REASONS, EQUILIBRIUM, SECTION
@@ -118,8 +119,8 @@ class LoopSection:
 
 def with_gain(loop: ClosedLoop, parameter: str, value: float) -> ClosedLoop:
     """The same loop with another r, L [1/s], n1 [N m/rad] or n2 [N m s/rad]; `ModelError` for others."""
-    if parameter not in GAIN_NAMES:
-        raise ModelError(f"parameter is {parameter!r}: 'r', 'L', 'n1' or 'n2' (eqs 5-7)")
+    if not is_one_of(parameter, GAIN_NAMES):
+        raise ModelError(f"parameter is {shown(parameter)}: 'r', 'L', 'n1' or 'n2' (eqs 5-7)")
     name = GAIN_NAMES[parameter]
     gains = replace(loop.controller.gains, **{name: value})
     return replace(loop, controller=replace(loop.controller, gains=gains))
