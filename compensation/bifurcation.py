@@ -35,7 +35,7 @@ from compensation.rest_pieces import (
     rest_pieces,
 )
 from ident.model.friction import ModelError
-from ident.model.numbers import real_array, shown
+from ident.model.numbers import is_one_of, real_array, shown
 from ident.simulation.filippov_system import FloatArray
 
 Kind = Literal["equilibrium_set", "equilibrium", "limit_cycle"]
@@ -91,8 +91,8 @@ def diagram(loop: ClosedLoop, parameter: Parameter, values: ArrayLike) -> Diagra
     ModelError
         If the parameter is unknown, or the values are no ascending finite numbers >= 0.
     """
-    if parameter not in ("r", "L"):
-        raise ModelError(f"parameter is {parameter!r}: a diagram is drawn over 'r' or 'L' (eqs 6-7)")
+    if not is_one_of(parameter, ("r", "L")):
+        raise ModelError(f"parameter is {shown(parameter)}: a diagram is drawn over 'r' or 'L' (eqs 6-7)")
     grid = real_array(values)
     if grid is None or grid.ndim != 1 or grid.size == 0 or not np.isfinite(grid).all():
         raise ModelError(f"values of {parameter} are {shown(values)}: a list of finite numbers (eqs 6-7)")

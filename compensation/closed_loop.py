@@ -79,7 +79,7 @@ def simulate(
         If a start, time or tolerance is no number, or times run backwards or out of the duration.
     """
     state = _checked_start(start)
-    check_accuracy(duration, tolerance)
+    duration, tolerance = checked_accuracy(duration, tolerance)
     if times is None:
         _, marks = _run(loop, state.copy(), np.empty(0), np.empty((0, 3)), duration, tolerance)
         points = min(GRID_LIMIT, max(2, math.ceil(duration * GRID_RATE)))
@@ -159,12 +159,16 @@ def _checked_start(start: ArrayLike) -> FloatArray:
     return state
 
 
-def check_accuracy(duration: float, tolerance: float) -> None:
-    """`ModelError` unless the duration [s] and the tolerance [-] of a run are possible ones."""
+def checked_accuracy(duration: float, tolerance: float) -> tuple[float, float]:
+    """The duration [s] and the tolerance [-] of a run, as floats; `ModelError` unless they are possible ones.
+
+    Of a number of any other type numba would compile the kernels once more.
+    """
     if not (is_number(duration) and duration > 0):
         raise ModelError(f"duration is {duration!r}: a finite number of seconds > 0 (eq 8)")
     if not (is_number(tolerance) and 0 < tolerance < 1):
         raise ModelError(f"tolerance is {tolerance!r}: between 0 and 1, relative to the largest state (eq 8)")
+    return float(duration), float(tolerance)
 
 
 def checked_times(times: ArrayLike, duration: float) -> FloatArray:

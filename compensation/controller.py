@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Final
 
 from ident.model.friction import ModelError
-from ident.model.numbers import is_number
+from ident.model.numbers import is_number, is_one_of, keep_floats, shown
 from ident.model.robot import OneLinkRobot
 
 GAIN_OF: Final = {"n1": "proportional", "n2": "derivative", "L": "observer", "r": "compensation"}  # by symbol
@@ -34,6 +34,7 @@ class Gains:
                 raise ModelError(f"{field.name} gain is {value!r}: a gain is a finite number >= 0 (eqs 5-7)")
         if self.proportional == 0:
             raise ModelError("proportional gain is 0: n1 > 0, or no position is a set point (eq 5)")
+        keep_floats(self, (field.name for field in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,6 @@ def with_gain(controller: Controller, parameter: str, value: float) -> Controlle
 
     Raises `ModelError` for another parameter, or a value that is no gain.
     """
-    if parameter not in GAIN_OF:
-        raise ModelError(f"parameter is {parameter!r}: 'r', 'L', 'n1' or 'n2' (eqs 5-7)")
+    if not is_one_of(parameter, GAIN_OF):
+        raise ModelError(f"parameter is {shown(parameter)}: 'r', 'L', 'n1' or 'n2' (eqs 5-7)")
     return replace(controller, gains=replace(controller.gains, **{GAIN_OF[parameter]: value}))

@@ -13,7 +13,6 @@ named by the event that appears; what the motion settles on beyond it begins a b
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -33,6 +32,7 @@ from compensation.orbits.cycle_equation import JOINED, CycleEquation
 from compensation.orbits.periodic_orbits import Cycle, cycle_at, find_cycle, shoot
 from compensation.orbits.solution_curve import CurvePoint, Lost
 from ident.model.friction import ModelError
+from ident.model.numbers import is_one_of, real_array, shown
 from ident.simulation.filippov_system import FloatArray
 
 Gain = Literal["r", "L", "n1", "n2"]
@@ -128,17 +128,20 @@ def cycle_branch(
 
 
 def _checked(loop: ClosedLoop, gain: Gain, span: tuple[float, float]) -> float:
-    if gain not in GAIN_OF:
-        raise ModelError(f"gain is {gain!r}: branches are drawn over 'r', 'L', 'n1' or 'n2' (eqs 5-7)")
+    if not is_one_of(gain, GAIN_OF):
+        raise ModelError(f"gain is {shown(gain)}: branches are drawn over 'r', 'L', 'n1' or 'n2' (eqs 5-7)")
     value = float(getattr(loop.controller.gains, GAIN_OF[gain]))
-    low, high = span
-    if not (math.isfinite(low) and math.isfinite(high)):
-        raise ModelError(f"span of {gain} is {span}: a gain is a finite number (eqs 5-7)")
+    ends = real_array(span)
+    if ends is None or ends.shape != (2,) or not np.isfinite(ends).all():
+        raise ModelError(f"span of {gain} is {shown(span)}: two gains, each a finite number (eqs 5-7)")
+    low, high = ends.tolist()
     if low < 0.0 or (gain == "n1" and low == 0.0):
         least = "n1 > 0, or no position is a set point (eq 5)" if gain == "n1" else "a gain is >= 0 (eqs 5-7)"
         raise ModelError(f"span of {gain} is {span}: {least}")
     if not low <= value <= high or not low < high:
-        raise ModelError(f"span of {gain} is {span}: an ascending pair around the loop's own {value:g}")
+        raise ModelError(
+            f"span of {gain} is {span}: an ascending pair around the loop's own {value:g} (eqs 5-7)"
+        )
     return value
 
 

@@ -29,7 +29,7 @@ from numpy.typing import ArrayLike
 from compensation.controller import Controller, with_gain
 from compensation.torque_balance import TorqueBalance
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
-from ident.model.numbers import is_number, real_array, shown
+from ident.model.numbers import is_number, is_one_of, real_array, shown
 from ident.model.robot import OneLinkRobot
 
 Direction = Literal["positive", "negative"]
@@ -119,8 +119,10 @@ def equilibrium_sets(
 
 def curve_of(friction: StribeckFriction, direction: Direction) -> StribeckCurve:
     """The curve of one direction; `ModelError` for another word."""
-    if direction not in DIRECTIONS:
-        raise ModelError(f"direction is {direction!r}: 'positive' or 'negative', the sign of x2 (eqs 9-10)")
+    if not is_one_of(direction, DIRECTIONS):
+        raise ModelError(
+            f"direction is {shown(direction)}: 'positive' or 'negative', the sign of x2 (eqs 9-10)"
+        )
     return friction.positive if direction == "positive" else friction.negative
 
 

@@ -17,7 +17,7 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from compensation.closed_loop import STEP_LIMIT, ClosedLoop, check_accuracy, checked_times
+from compensation.closed_loop import STEP_LIMIT, ClosedLoop, checked_accuracy, checked_times
 from compensation.controller import Gains
 from compensation.loop_lanes import LOOP_LANES
 from compensation.loop_modes import surfaces
@@ -82,13 +82,14 @@ def simulate_many(
     """
     first = _checked_starts(starts)
     rows = gain_row(loop.controller)[np.newaxis] if gains is None else _checked_gains(gains, first.shape[0])
-    check_accuracy(duration, tolerance)
+    duration, tolerance = checked_accuracy(duration, tolerance)
     if not (is_count(parts) and parts >= 1):
         raise ModelError(f"parts is {parts!r}: a whole number >= 1, into which the runs of eq (8) are cut")
     tables = tables_over_gains(loop.robot, loop.controller, rows)
     runs = np.array([run_for(tables[0])])  # the laws, and so the method, are the same for all
     wanted = checked_times(times, duration)
     count = first.shape[0]
+    parts = min(int(parts), max(count, 1))  # more of them would be empty
     states = np.full((count, wanted.size, STATES), np.nan)
     end_times, reasons = np.empty(count), np.empty(count, np.int64)
 

@@ -31,7 +31,15 @@ from numpy.typing import NDArray
 from compensation.controller import Controller
 from compensation.observer import euler_change, exact_change
 from ident.model.friction import ModelError
-from ident.model.numbers import is_count, is_number, is_number_or_inf, real_array, shown
+from ident.model.numbers import (
+    is_count,
+    is_number,
+    is_number_or_inf,
+    is_one_of,
+    keep_floats,
+    real_array,
+    shown,
+)
 from ident.model.robot import OneLinkRobot
 from ident.response import NO_RIPPLE, TorqueRipple, advance_with_ripple, law_array, plant_array
 from ident.simulation.compiled import compiled, owning
@@ -71,14 +79,16 @@ class Sampling:
             raise ModelError(
                 f"encoder resolution is {self.resolution!r} rad a count: finite, >= 0 (eqs 5-7, as sampled)"
             )
-        if self.observer_update not in get_args(ObserverUpdate):
-            raise ModelError(f"observer_update is {self.observer_update!r}: 'euler' or 'exact', for eq (7)")
+        if not is_one_of(self.observer_update, get_args(ObserverUpdate)):
+            update = shown(self.observer_update)
+            raise ModelError(f"observer_update is {update}: 'euler' or 'exact', for eq (7)")
         if not (is_count(self.delay) and self.delay >= 0):
             raise ModelError(f"delay is {self.delay!r}: a whole number of samples >= 0 (eqs 5-7, as sampled)")
         if not (is_number_or_inf(self.torque_limit) and self.torque_limit > 0):
             raise ModelError(
                 f"torque limit is {self.torque_limit!r} N m: > 0, inf for none (eqs 5-7, as sampled)"
             )
+        keep_floats(self, ("period", "resolution", "torque_limit"))
 
 
 @dataclass(frozen=True)
@@ -267,8 +277,12 @@ def run_many(
 
     Raises `ModelError` where the numbers of robots, controllers and starts do not fit, or as `run_sampled`.
     """
+    given = (("robots", robots), ("controllers", controllers), ("starts", starts))
+    for name, values in given:
+        if not isinstance(values, (Sequence, np.ndarray)):
+            raise ModelError(f"{name} are {shown(values)}: a list, one for each run (eqs 5-7, as sampled)")
     m = max(len(robots), len(controllers), len(starts), 1)
-    for name, values in (("robots", robots), ("controllers", controllers), ("starts", starts)):
+    for name, values in given:
         if len(values) not in (1, m):
             raise ModelError(
                 f"{len(values)} {name} for {m} runs: give one for each, or one for all (eqs 5-7, as sampled)"
@@ -297,7 +311,14 @@ def run_many(
 def _rows(count: int, duration: float, sampling: Sampling) -> FloatArray:
     if not (is_number(duration) and duration >= 0):
         raise ModelError(f"duration is {duration!r}: a finite number of seconds >= 0 (eqs 5-7, as sampled)")
-    return np.empty((count, math.floor(duration / sampling.period * (1 + 1e-12)) + 1))
+    samples = float(duration) / sampling.period * (1 + 1e-12)
+    try:
+        return np.empty((count, math.floor(samples) + 1))
+    except (MemoryError, OverflowError, ValueError):  # of numpy: more than an array can have
+        raise ModelError(
+            f"duration is {duration!r} s: {samples:.3g} samples of {sampling.period} s are more than there "
+            "is memory for (eqs 5-7, as sampled)"
+        ) from None
 
 
 def _controller_array(controller: Controller) -> FloatArray:

@@ -26,7 +26,7 @@ import numpy as np
 
 from data.recording import FloatArray
 from ident.model.friction import ModelError
-from ident.model.numbers import is_number
+from ident.model.numbers import is_number, is_one_of, keep_floats, real_array, shown
 from ident.model.robot import OneLinkRobot
 from ident.near_rest import slip_near_rest, speed_limit
 from ident.simulation.compiled import compiled, owning
@@ -75,6 +75,7 @@ class TorqueRipple:
             value = getattr(self, field.name)
             if not is_number(value):
                 raise ModelError(f"ripple {field.name} is {value!r}: a finite number (u of eq 1)")
+        keep_floats(self, (field.name for field in fields(self)))
 
 
 NO_RIPPLE: Final = TorqueRipple()
@@ -167,12 +168,15 @@ def respond(
 
     Raises `ModelError` for a period, start or torque that no rig can have.
     """
-    if not (math.isfinite(period) and period > 0):
-        raise ModelError(f"sample period is {period} s: a held torque needs a period > 0")
-    held = np.ascontiguousarray(torque, dtype=np.float64)
-    if held.ndim != 1 or not np.all(np.isfinite(held)) or not np.all(np.isfinite(start)):
-        raise ModelError("start and torque samples must be finite, and the torque one array (n,)")
-    positions, velocities = _respond(float(start[0]), float(start[1]), held, period, law_array(robot))
+    if not (is_number(period) and period > 0):
+        raise ModelError(f"sample period is {period!r} s: a finite h > 0 for which u is held (eq 1)")
+    held, x0 = real_array(torque), real_array(start)
+    if held is None or held.ndim != 1 or not np.isfinite(held).all():
+        raise ModelError(f"torque is {shown(torque)}: one array (n,) of finite u [N m] (eq 1)")
+    if x0 is None or x0.shape != (2,) or not np.isfinite(x0).all():
+        raise ModelError(f"start is {shown(start)}: two finite numbers q [rad], v [rad/s] (eq 1)")
+    position, velocity = x0.tolist()
+    positions, velocities = _respond(position, velocity, held, float(period), law_array(robot))
     return positions, velocities
 
 
@@ -204,11 +208,15 @@ def breakaway_delay(
     A detector that waits for `travel` therefore reads a static torque that is too large by `ramp_rate`
     times this delay. For small travel and beta = 1 it tends to the root of (u' tau^2 / J) (tau (e^(t/tau) -
     1) - t - t^2 / (2 tau)) = travel, with tau = J / (dF / v_s - b). Raises `ModelError` unless both
-    magnitudes are finite and > 0.
+    magnitudes are finite and > 0, and the direction is one of the two.
     """
-    for name, value in (("ramp rate", ramp_rate), ("travel", travel)):
-        if not (math.isfinite(value) and value > 0):
-            raise ModelError(f"{name} is {value}: a breakaway needs a ramp and a travel > 0, as magnitudes")
+    if not is_one_of(direction, ("positive", "negative")):
+        raise ModelError(f"direction is {shown(direction)}: 'positive' or 'negative' (eqs 2-4)")
+    for name, value in (("ramp_rate", ramp_rate), ("travel", travel)):
+        if not (is_number(value) and value > 0):
+            raise ModelError(
+                f"{name} is {value!r}: a breakaway needs a ramp rate and a travel > 0, as magnitudes (eq 1)"
+            )
     law = law_array(robot)
     curve = law[1:6] if direction == "positive" else law[6:11]
-    return float(_breakaway_delay(ramp_rate, travel, robot.inertia, curve))
+    return float(_breakaway_delay(float(ramp_rate), float(travel), robot.inertia, curve))

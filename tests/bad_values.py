@@ -13,6 +13,7 @@ import pytest
 from ident.model.friction import ModelError
 
 NO_NUMBERS: Final = ("0.4", None, 0.4j, math.nan, [0.4, 0.5], np.array(0.4), True, 10**400)
+NO_WORDS: Final[tuple[Any, ...]] = ("z", None, 1, [], ["r"], {}, np.array(["r", "L"]))
 NO_ARRAYS: Final = ("0.4", None, [0.4, None], [0.4j], np.array([0.4j]), [[0.4], [0.4, 0.5]], {0.4: 0.4})
 
 

@@ -57,18 +57,34 @@ def classify(
     """Verdict on a record: `time` (n,) [s], ascending, even or not; `position` (n,) [rad].
 
     `resolution` is one encoder count [rad]; 0 where unknown or continuous (counts are then recognised).
+    Samples that are not finite are left out. Raises `ValueError` for what is no number, or times that run
+    backwards.
     """
-    t = np.asarray(time, dtype=np.float64)
-    q = np.asarray(position, dtype=np.float64)
+    t, q = _samples("time", time), _samples("position", position)
+    if not (math.isfinite(reference) and 0.0 <= resolution < math.inf):
+        raise ValueError(
+            f"reference is {reference} rad, resolution {resolution} rad: finite, resolution >= 0 (figure 9)"
+        )
     if t.ndim != 1 or t.shape != q.shape:
         return _undecided(f"{t.size} times and {q.size} positions do not belong together")
     finite = np.isfinite(t) & np.isfinite(q)
     t, error = t[finite], q[finite] - reference
+    backwards = np.flatnonzero(np.diff(t) < 0.0)
+    if backwards.size:
+        before, after = t[backwards[0] : backwards[0] + 2]
+        raise ValueError(f"time must ascend: {after:g} s follows {before:g} s (periods of figure 9)")
     if t.size < FEWEST_SAMPLES or not t[-1] > t[0]:
         return _undecided(f"too short: {t.size} samples, at least {FEWEST_SAMPLES} are needed")
     smooth, band = _without_noise(error, resolution)
     turns = _Turns.of(t, smooth, band)
     return _rest(t, smooth, band, turns) or _cycle(t, error, smooth, band, turns)
+
+
+def _samples(name: str, values: ArrayLike) -> FloatArray:
+    found = np.asarray(values)
+    if found.dtype.kind not in "fiu":
+        raise ValueError(f"{name} holds {found.dtype} values: real numbers (x1 over time, figure 9)")
+    return found.astype(np.float64, copy=False)
 
 
 def _undecided(why: str) -> SteadyState:

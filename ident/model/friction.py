@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ident.model.numbers import is_number, real_array, shown
+from ident.model.numbers import is_number, keep_floats, real_array, shown
 
 STEEPEST_SHAPE: Final = 100.0
 
@@ -64,6 +64,7 @@ class StribeckCurve:
             )
         if self.viscous_damping < 0:
             raise ModelError(f"viscous_damping is {self.viscous_damping:g} N m s/rad: b >= 0 (eq 1)")
+        keep_floats(self, (field.name for field in fields(self)))
 
     @property
     def stribeck_torque(self) -> float:

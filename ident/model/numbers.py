@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import reprlib
+from collections.abc import Collection, Iterable
 from typing import Final
 
 import numpy as np
@@ -33,6 +34,22 @@ def is_number_or_inf(value: object) -> bool:
 def is_count(value: object) -> bool:
     """Whether a value is a whole number."""
     return isinstance(value, (int, np.integer)) and is_number(value)
+
+
+def is_one_of(value: object, words: Collection[str]) -> bool:
+    """Whether a value is one of a few words; nothing else is, be it a list or an array."""
+    return isinstance(value, str) and value in words
+
+
+def keep_floats(owner: object, names: Iterable[str]) -> None:
+    """Turn numbers of a frozen value, just made and checked, into floats.
+
+    A number in single precision would go on as such into all that is computed from it.
+    """
+    for name in names:
+        value = getattr(owner, name)
+        if type(value) is not float:
+            object.__setattr__(owner, name, float(value))
 
 
 def real_array(values: ArrayLike) -> NDArray[np.float64] | None:

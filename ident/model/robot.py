@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ident.model.friction import ModelError, StribeckFriction
-from ident.model.numbers import is_number
+from ident.model.numbers import is_number, keep_floats
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,7 @@ class OneLinkRobot:
             raise ModelError(f"inertia is {self.inertia!r} kg m^2: a finite J > 0 (eq 1)")
         if not isinstance(self.friction, StribeckFriction):
             raise ModelError(f"friction is {self.friction!r}: a StribeckFriction (eqs 2-4)")
+        keep_floats(self, ("inertia",))
 
     def mean(self) -> OneLinkRobot:
         """The symmetric robot with the means of the two directions."""

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from compensation.closed_loop import ClosedLoop, simulate, torque
 from compensation.controller import Controller, Gains
+from compensation.loop_runs import follow
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
@@ -315,6 +316,15 @@ def test_bad_input_is_named(arguments: dict[str, object], said: str) -> None:
     given: dict[str, object] = {"start": START, "duration": 3.0, **arguments}
     with pytest.raises(ModelError, match=said):
         simulate(loop(1.0), **given)  # type: ignore[arg-type]  # wrong on purpose
+
+
+def test_whole_seconds_compile_nothing_anew() -> None:
+    run = simulate(loop(1.1), START, duration=2.0, tolerance=1e-6)
+    compiled = len(follow.signatures)  # type: ignore[attr-defined]  # numba's own
+    again = simulate(loop(1.1), START, duration=2, tolerance=np.float64(1e-6))
+    assert simulate(loop(0.5), START, duration=2**70).end_reason == "equilibrium"
+    assert len(follow.signatures) == compiled  # type: ignore[attr-defined]  # as above
+    np.testing.assert_array_equal(again.state, run.state)
 
 
 def test_what_is_no_number_is_refused_by_name() -> None:

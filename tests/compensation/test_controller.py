@@ -6,7 +6,7 @@ import pytest
 
 from compensation.controller import Controller, Gains, with_gain
 from ident.model.published import symmetric_robot
-from tests.bad_values import NO_NUMBERS, each_refused, refused
+from tests.bad_values import NO_NUMBERS, NO_WORDS, each_refused, refused
 
 VALUES = {"proportional": 0.4, "derivative": 0.02, "observer": 73.5, "compensation": 1.0}
 CONTROLLER = Controller(Gains(**VALUES), symmetric_robot())
@@ -29,4 +29,5 @@ def test_one_gain_is_changed_and_no_other() -> None:
     assert changed == Controller(Gains(0.4, 0.02, 40.0, 1.0), symmetric_robot())
     assert with_gain(changed, "L", 73.5) == CONTROLLER
     refused(lambda: with_gain(CONTROLLER, "z", 1.0), "parameter", "'z'")
+    each_refused(with_gain, {"controller": CONTROLLER, "value": 1.0}, {"parameter": NO_WORDS})
     refused(lambda: with_gain(CONTROLLER, "r", -1.0), "compensation gain")

@@ -246,6 +246,9 @@ def test_a_fold_of_cycles_has_an_unstable_side() -> None:
         ("r", (-1.0, 1.2), "span of r .* >= 0 .eqs 5-7"),
         ("r", (1.0, np.inf), "span of r .* finite number .eqs 5-7"),
         ("r", (np.nan, 1.2), "span of r .* finite"),
+        ("r", 1.0, "span of r .* two gains"),
+        ("r", ("1.0", None), "span of r .* two gains"),
+        (["r"], (1.0, 1.2), "gain is"),
         ("n1", (0.0, 1.0), "span of n1 .*n1 > 0, .*eq 5"),
     ],
 )

@@ -15,7 +15,7 @@ from compensation.equilibria import EquilibriumSet, equilibrium_set, equilibrium
 from ident.model.friction import StribeckFriction
 from ident.model.published import DERIVATIVE_GAIN, PROPORTIONAL_GAIN, asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
-from tests.bad_values import NO_ARRAYS, NO_NUMBERS, each_refused, refused
+from tests.bad_values import NO_ARRAYS, NO_NUMBERS, NO_WORDS, each_refused, refused
 from tests.strategies import controllers, robots
 
 
@@ -134,7 +134,7 @@ def test_a_sweep_is_its_single_sets() -> None:
 def test_what_is_no_sweep_is_refused_by_name() -> None:
     robot = symmetric_robot()
     given = {"robot": robot, "controller": Controller(gains(1.0, 40.0), robot)}
-    each_refused(torque_balance, given, {"direction": ("up", None, 1)})
+    each_refused(torque_balance, given, {"direction": ("up", *NO_WORDS)})
     sweep: dict[str, Any] = {**given, "parameter": "r", "values": [1.0]}
     bad = {"parameter": ("z", "l", None, 1), "values": (*NO_ARRAYS, 1.0)}
     each_refused(equilibrium_sets, sweep, bad)

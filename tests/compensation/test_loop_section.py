@@ -17,7 +17,7 @@ from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
-from tests.bad_values import each_refused, refused
+from tests.bad_values import NO_WORDS, each_refused, refused
 
 
 def section(r: float, observer: float = 73.5, robot: OneLinkRobot | None = None) -> LoopSection:
@@ -202,5 +202,5 @@ def test_a_motion_that_comes_to_rest_has_no_derivative() -> None:
 
 def test_only_gains_are_changed() -> None:
     loop = section(1.0).loop
-    each_refused(with_gain, {"loop": loop, "parameter": "r", "value": 1.0}, {"parameter": ("z", None)})
+    each_refused(with_gain, {"loop": loop, "parameter": "r", "value": 1.0}, {"parameter": NO_WORDS})
     refused(lambda: with_gain(loop, "n1", 0.0), "proportional gain")

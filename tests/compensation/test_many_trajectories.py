@@ -110,6 +110,12 @@ def test_what_is_no_number_is_refused_by_name() -> None:
     each_refused(simulate_many, given, bad)
 
 
+def test_more_parts_than_trajectories_are_as_many() -> None:
+    alone = simulate_many(LOOP, STARTS, duration=1, gains=ROWS)
+    cut = simulate_many(LOOP, STARTS, duration=1.0, gains=ROWS, parts=2**70)
+    np.testing.assert_allclose(cut.end_state, alone.end_state, atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("column", "value", "name"),
     [(0, 0.0, "proportional"), (1, -1.0, "derivative"), (2, np.nan, "observer"), (3, np.inf, "compensation")],

@@ -16,7 +16,7 @@ from ident.model.friction import ModelError
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
 from ident.response import respond
-from tests.bad_values import NO_ARRAYS, NO_NUMBERS, each_refused, refused
+from tests.bad_values import NO_ARRAYS, NO_NUMBERS, NO_WORDS, each_refused, refused
 
 SYMMETRIC, TABLE_1 = symmetric_robot(), asymmetric_robot()
 COUNT = 2 * math.pi / 2**18
@@ -166,7 +166,7 @@ def test_what_is_no_number_is_refused_by_name() -> None:
     each_refused(Sampling, {}, {"period": (*NO_NUMBERS, math.inf, -1.0)})
     settings = {
         "resolution": (*NO_NUMBERS, math.inf),
-        "observer_update": ("rk4", "Euler", None, 1),
+        "observer_update": ("rk4", "Euler", *NO_WORDS),
         "delay": (*NO_NUMBERS, 1.5, math.inf),
     }
     each_refused(Sampling, {"period": 1e-3}, settings)
@@ -178,7 +178,7 @@ def test_what_is_no_number_is_refused_by_name() -> None:
     given = {**run, "start": (0.6, 0.0), "duration": 1.0}
     bad = {
         "start": (*NO_ARRAYS, 0.6, (math.nan, 0.0), (0.6, 0.0, 0.0)),
-        "duration": (*NO_NUMBERS, math.inf, -1.0),
+        "duration": (*NO_NUMBERS, math.inf, -1.0, 2**70, 1e300),
         "reference": (*NO_NUMBERS, math.inf),
     }
     each_refused(run_sampled, given, bad)
@@ -189,6 +189,6 @@ def test_what_is_no_number_is_refused_by_name() -> None:
 @pytest.mark.parametrize("name", ["robots", "controllers", "starts"])
 def test_no_runs_are_none(name: str) -> None:
     given = {"robots": [TABLE_1], "controllers": [controller(1.0)], "starts": [(0.6, 0.0)]}
-    each_refused(run_many, {**given, "sampling": Sampling(1e-3), "duration": 1.0}, {name: ([],)})
+    each_refused(run_many, {**given, "sampling": Sampling(1e-3), "duration": 1.0}, {name: ([], None, 0.6)})
     nothing: dict[str, Any] = {"robots": [], "controllers": [], "starts": []}
     each_refused(run_many, {**nothing, "sampling": Sampling(1e-3), "duration": 1.0}, {"robots": ([],)})

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from data.recording import FloatArray
-from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
+from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
 from ident.response import (
@@ -25,7 +25,7 @@ from ident.response import (
     plant_array,
     respond,
 )
-from tests.bad_values import NO_NUMBERS, each_refused
+from tests.bad_values import NO_ARRAYS, NO_NUMBERS, NO_WORDS, each_refused
 from tests.strategies import robots
 
 TABLE_1 = asymmetric_robot()
@@ -247,12 +247,18 @@ def test_each_direction_has_its_own_delay(direction: Literal["positive", "negati
 
 
 def test_refuses_what_no_rig_can_have() -> None:
-    with pytest.raises(ModelError, match="sample period"):
-        respond(TABLE_1, start=(0.0, 0.0), torque=np.zeros(3), period=0.0)
-    with pytest.raises(ModelError, match="finite"):
-        respond(TABLE_1, start=(0.0, 0.0), torque=np.array([0.0, math.nan]), period=1e-3)
-    with pytest.raises(ModelError, match="ramp rate"):
-        breakaway_delay(TABLE_1, direction="positive", ramp_rate=-0.1, travel=1e-3)
+    held = {"robot": TABLE_1, "start": (0.0, 0.0), "torque": np.zeros(3), "period": 1e-3}
+    bad = {
+        "start": (*NO_ARRAYS, 0.6, (math.nan, 0.0), (0.6, 0.0, 0.0)),
+        "torque": (*NO_ARRAYS, 0.6, [0.0, math.nan]),
+        "period": (*NO_NUMBERS, 0.0, math.inf),
+    }
+    each_refused(respond, held, bad)
+    ramp = {"robot": TABLE_1, "direction": "positive", "ramp_rate": 0.1, "travel": 1e-3}
+    magnitudes = (*NO_NUMBERS, 0.0, -0.1, math.inf)
+    each_refused(
+        breakaway_delay, ramp, {"direction": ("up", *NO_WORDS), "ramp_rate": magnitudes, "travel": magnitudes}
+    )
 
 
 @pytest.mark.parametrize("name", ["amplitude", "harmonic", "phase"])

@@ -112,6 +112,18 @@ def test_drift_is_undecided() -> None:
     assert classify(TIME, noisy(wave), resolution=COUNT).verdict == "undecided"
 
 
+def test_what_is_no_record_is_refused_by_name() -> None:
+    still = np.zeros(TIME.size)
+    with pytest.raises(ValueError, match=r"time must ascend: 0 s follows 29\.999 s"):
+        classify(np.concatenate([TIME[200:], TIME[:200]]), still)
+    for name, words in (("time", [TIME.astype(str), still]), ("position", [TIME, still + 1j])):
+        with pytest.raises(ValueError, match=f"{name} holds"):
+            classify(*words)
+    for wrong in ({"reference": math.nan}, {"resolution": -1.0}, {"resolution": math.inf}):
+        with pytest.raises(ValueError, match=next(iter(wrong))):
+            classify(TIME, still, **wrong)
+
+
 def test_a_record_too_short_says_so() -> None:
     assert "too short" in classify([0.0, 1.0], [0.0, 0.0]).why
     assert classify([], []).verdict == "undecided"

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from ident.model.numbers import is_count, is_number, is_number_or_inf, real_array, shown
-from tests.bad_values import NO_ARRAYS, NO_NUMBERS
+from ident.model.numbers import is_count, is_number, is_number_or_inf, is_one_of, real_array, shown
+from tests.bad_values import NO_ARRAYS, NO_NUMBERS, NO_WORDS
 
 
 @pytest.mark.parametrize("value", [0, -1.5, np.float32(2.0), np.int64(3)])
@@ -19,6 +19,11 @@ def test_finite_reals_of_python_and_numpy_are_numbers(value: object) -> None:
 def test_all_else_is_none(value: object) -> None:
     assert not is_number(value)
     assert is_number_or_inf(value) == (value is math.inf)
+
+
+def test_only_a_word_is_one_of_some_words() -> None:
+    assert is_one_of("r", ("r", "L"))
+    assert not any(is_one_of(value, ("r", "L")) for value in NO_WORDS)
 
 
 def test_counts_are_whole() -> None:
