@@ -62,9 +62,14 @@ def distance(one: Cycle, other: Cycle) -> float:
 
 
 def mirrored(cycle: Cycle, section: LoopSection) -> Cycle:
-    """The mirror image of an asymmetric cycle of a symmetric loop: in its map, the other half turn."""
-    (point,) = section.follow(cycle.point, 1).points
-    return replace(cycle, point=point, x1_min=-cycle.x1_max, x1_max=-cycle.x1_min)
+    """The mirror image of an asymmetric cycle of a symmetric loop: in its map, the other half turn.
+
+    A cycle whose half turn is no return by itself, as the link all but rests on the way, is its own image.
+    """
+    points = section.follow(cycle.point, 1).points
+    if points.size == 0:
+        return cycle
+    return replace(cycle, point=points[0], x1_min=-cycle.x1_max, x1_max=-cycle.x1_min)
 
 
 def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, cold: FloatArray) -> list[list[Cycle]]:

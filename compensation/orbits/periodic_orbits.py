@@ -207,5 +207,8 @@ def slope_of(section: ReturnMap, point: FloatArray, returns: int) -> FloatArray 
             return None
         slope = once @ slope
         if index + 1 < returns:
-            at = section.follow(at, 1).points[-1]
+            points = section.follow(at, 1).points
+            if points.size == 0:
+                return None
+            at = points[-1]
     return slope

@@ -125,6 +125,7 @@ def integrate(
     events = 0
     found = 0
     stalled = 0
+    touched = -1  # a surface that was turned back from, and has not been left since
     suggested = 1e-2
     crawl = SHORTEST_CRAWL
     for step in range(settings.step_limit):
@@ -194,16 +195,24 @@ def integrate(
             for i in range(m):
                 contact[i] = 0
             if surface < 0:
+                if touched >= 0 and _has_left(surfaces, touched, settings.tolerance, state):
+                    touched = -1
                 continue
             arrived_from = signs[surface]
             reached = _meet(system, surfaces, parameters, surface, state, signs, contact, rate)
             if signs[surface] == arrived_from:
                 _hold(system, surfaces, parameters, surface, state, signs, contact, rate)
-            elif reached == 1 and signs[surface] == -arrived_from:
+            elif reached == 1 and signs[surface] == -arrived_from and surface != touched:
                 time += _turn_back(
                     system, surfaces, parameters, surface, arrived_from, settings, time, state, signs,
                     contact, rate,
                 )  # fmt: skip
+                while output < wanted and record.times[output] <= time:
+                    for j in range(n):
+                        back = record.times[output] - time
+                        record.states[output, j] = state[j] + back * rate[j]
+                    output += 1
+                touched = surface if signs[surface] == arrived_from else -1
         if events < record.event_times.size:
             record.event_times[events] = time
             record.event_surfaces[events] = surface
@@ -339,7 +348,8 @@ def _turn_back(
 
     Which side such a motion goes on to is beyond the tolerance, and it is kept on its own, whatever the
     tolerance. That matters where the field is not Lipschitz: a term that grows as the root of the distance
-    draws the motion onto a path that touches the surface, which it passes at a distance far below rounding.
+    draws the motion onto a path that touches the surface, passed at a distance far below rounding. A motion
+    that comes again before it has left by as much is driven across, and crosses.
     """
     n, size = state.size, 0.0
     for j in range(n):
@@ -358,6 +368,15 @@ def _turn_back(
     project(surfaces, surface, state)
     signs[surface], contact[surface] = side, 2
     return span
+
+
+@specialised
+def _has_left(surfaces: Surfaces, surface: int, tolerance: float, state: FloatArray) -> bool:
+    """Whether a state is farther from a surface than a step may err."""
+    size = 0.0
+    for j in range(state.size):
+        size = max(size, abs(state[j]))
+    return bool(abs(switching_value(surfaces, surface, state)) > tolerance * size)
 
 
 @specialised
