@@ -28,8 +28,9 @@ def explained(path: Path, table: Mapping[str, object], failure: ValidationError)
     elif first["type"] == "missing":
         message += "is missing"
     else:
-        message += first["msg"].removeprefix("Value error, ")
-        if not isinstance(first["input"], (Mapping, list)) and repr(first["input"]) not in message:
+        rule = first["msg"].removeprefix("Value error, ")
+        message += rule
+        if not isinstance(first["input"], (Mapping, list)) and repr(first["input"]) not in rule:
             message += f" (it is {first['input']!r})"
     others = len(errors) - 1
     return message + (f" (and {others} more to correct)" if others else "")
