@@ -157,6 +157,24 @@ def test_a_link_that_halts_without_turning_ends_the_search() -> None:
     assert drawn.branches
 
 
+def test_half_turns_that_are_no_returns_break_no_diagram() -> None:
+    """The model is far from the robot: on the way of cycles of two returns the link all but rests."""
+
+    def robot(inertia: float, *law: float) -> OneLinkRobot:
+        return OneLinkRobot(inertia, StribeckFriction.symmetric(StribeckCurve(*law)))
+
+    true = robot(0.01631757085329408, 0.5160596780814289, 0.24310354060304665, 0.08765474291449978, 0.0890046)
+    model = robot(0.23177673516130345, 0.6976168275253933, 0.4071368940022393, 0.06993744788698908, 0.1347659)
+    gains = Gains(0.993544586364019, 0.10831356165905676, observer=11.7, compensation=0.9)
+    assert diagram(ClosedLoop(true, Controller(gains, model)), "L", [50.0, 75.0]).branches
+    true = robot(
+        0.023706837588159765, 0.46925199247480276, 0.3395118340135017, 0.0933241605181, 0.18777207834
+    )
+    model = robot(0.2939019749796513, 0.47102804766177536, 0.3831496018471239, 0.038624764978, 0.187089698491)
+    gains = Gains(0.21148945277448333, 0.11917836134361595, observer=49.8, compensation=0.9)
+    assert diagram(ClosedLoop(true, Controller(gains, model)), "L", [25.0, 50.0]).branches
+
+
 def test_bad_input_is_named() -> None:
     with pytest.raises(ModelError, match="'r' or 'L'"):
         diagram(loop(), "n1", [1.0])  # type: ignore[arg-type]  # wrong on purpose

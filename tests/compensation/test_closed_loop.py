@@ -274,6 +274,19 @@ def test_a_law_steep_at_rest_gives_one_answer_at_any_tolerance(tolerance: float)
     assert all(event.state[1] == 0.0 and abs(event.time - 3.663975) < 1e-5 for event in touches)
 
 
+def test_outputs_beside_a_touch_are_given() -> None:
+    curves = (
+        StribeckCurve(0.5286936891539086, 0.23763953395726653, 0.9387431402033812, 0.07256747300213409, 0.5),
+        StribeckCurve(0.41053773608123, 0.1701705097060093, 0.07335445580999159, 0.05763675068894312, 0.7),
+    )
+    robot = OneLinkRobot(0.13171421188476312, StribeckFriction(*curves))
+    gains = Gains(0.31411756522579815, 0.1639009763066145, 195.05679993268467, 1.5)
+    start = (0.0031822651477523265, -0.001439143192609839, 0.0013835486555378589)
+    run = simulate(ClosedLoop(robot, Controller(gains, robot)), start, duration=40.0)
+    assert run.end_reason == "time reached"
+    assert np.isfinite(run.state).all()
+
+
 @pytest.mark.parametrize("shape", [0.5, 0.7, 0.9])
 def test_laws_steep_at_rest_converge_with_the_power_beta_of_the_tolerance(shape: float) -> None:
     curve = replace(symmetric_robot().friction.positive, stribeck_shape=shape)
