@@ -112,9 +112,7 @@ class Findings:
     """What a campaign found."""
 
     failures: Failures
-    imprecise: (
-        int  # continued, but off by what neither a tighter tolerance from the start nor a nudge explains
-    )
+    imprecise: int  # continued, but off by what neither a tighter tolerance nor a nudge explains
     stepped: int  # how many the time stepper has run
     piecewise: int  # of them: agree in every window, not over the whole duration
     unstable: int  # of them: do not agree in some window, where a nudge does as much

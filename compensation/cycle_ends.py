@@ -77,9 +77,7 @@ def end_of(around: Neighbourhood, curve: Curve) -> tuple[CycleEvent, list[tuple[
         at = curve.events[-1] if curve.events else last
         return CycleEvent("end", at.p, JOINED), []
     beyond = _beyond(around, last)
-    if curve.end_reason.startswith(
-        "limit"
-    ):  # where an unstable branch is too stiff to follow, motion leaves it
+    if curve.end_reason.startswith("limit"):  # motion leaves an unstable branch that is too stiff to follow
         return CycleEvent("end", last.p, curve.end_reason), beyond
     if curve.end_reason in LOSSES:
         return CycleEvent("end", last.p, LOSSES[curve.end_reason]), beyond

@@ -22,7 +22,6 @@ import numpy as np
 from ident.simulation.compiled import compiled, specialised
 from ident.simulation.crossing import first_crossing
 from ident.simulation.filippov_system import (
-    TANGENT_STEP,
     FilippovSystem,
     FloatArray,
     OneStepMethod,
@@ -36,6 +35,7 @@ from ident.simulation.filippov_system import (
 )
 from ident.simulation.polynomials import evaluate, sum_up
 from ident.simulation.taylor import ORDER
+from ident.simulation.touching import back_along, has_left, turn_back
 
 TIME_REACHED: Final = 0
 EQUILIBRIUM: Final = 1
@@ -195,7 +195,7 @@ def integrate(
             for i in range(m):
                 contact[i] = 0
             if surface < 0:
-                if touched >= 0 and _has_left(surfaces, touched, settings.tolerance, state):
+                if touched >= 0 and has_left(surfaces, touched, settings.tolerance, state):
                     touched = -1
                 continue
             arrived_from = signs[surface]
@@ -203,14 +203,12 @@ def integrate(
             if signs[surface] == arrived_from:
                 _hold(system, surfaces, parameters, surface, state, signs, contact, rate)
             elif reached == 1 and signs[surface] == -arrived_from and surface != touched:
-                time += _turn_back(
-                    system, surfaces, parameters, surface, arrived_from, settings, time, state, signs,
-                    contact, rate,
+                time += turn_back(
+                    system, surfaces, parameters, surface, arrived_from, settings.tolerance,
+                    settings.end - time, state, signs, contact, rate,
                 )  # fmt: skip
                 while output < wanted and record.times[output] <= time:
-                    for j in range(n):
-                        back = record.times[output] - time
-                        record.states[output, j] = state[j] + back * rate[j]
+                    back_along(state, rate, time - record.times[output], record.states[output])
                     output += 1
                 touched = surface if signs[surface] == arrived_from else -1
         if events < record.event_times.size:
@@ -328,55 +326,6 @@ def _meet(
         if contact[i] == 1:
             signs[i] = resolve(system, surfaces, i, signs, state, parameters, rate)
     return reached
-
-
-@specialised
-def _turn_back(
-    system: FilippovSystem,
-    surfaces: Surfaces,
-    parameters: FloatArray,
-    surface: int,
-    side: int,
-    settings: Settings,
-    time: float,
-    state: FloatArray,
-    signs: Signs,
-    contact: Signs,
-    rate: FloatArray,
-) -> float:
-    """Undo a crossing that is shallower than the error of a step, and go to where it turns back; how long.
-
-    Which side such a motion goes on to is beyond the tolerance, and it is kept on its own, whatever the
-    tolerance. That matters where the field is not Lipschitz: a term that grows as the root of the distance
-    draws the motion onto a path that touches the surface, passed at a distance far below rounding. A motion
-    that comes again before it has left by as much is driven across, and crosses.
-    """
-    n, size = state.size, 0.0
-    for j in range(n):
-        size = max(size, abs(state[j]))
-    nearing = side * leaving_rate(system, surfaces, surface, side, signs, state, parameters, rate)
-    for j in range(n):
-        rate[n + j] = state[j] + TANGENT_STEP * rate[j]
-    ahead = rate[n : 2 * n]
-    later = side * leaving_rate(system, surfaces, surface, side, signs, ahead, parameters, rate)
-    turning = (later - nearing) / TANGENT_STEP
-    if nearing >= 0.0 or turning <= 0.0 or 0.5 * nearing * nearing > settings.tolerance * size * turning:
-        return 0.0
-    span = min(-nearing / turning, settings.end - time)
-    for j in range(n):
-        state[j] += span * (ahead[j] - state[j]) / TANGENT_STEP
-    project(surfaces, surface, state)
-    signs[surface], contact[surface] = side, 2
-    return span
-
-
-@specialised
-def _has_left(surfaces: Surfaces, surface: int, tolerance: float, state: FloatArray) -> bool:
-    """Whether a state is farther from a surface than a step may err."""
-    size = 0.0
-    for j in range(state.size):
-        size = max(size, abs(state[j]))
-    return bool(abs(switching_value(surfaces, surface, state)) > tolerance * size)
 
 
 @specialised

@@ -184,6 +184,9 @@ def test_a_link_that_rests_at_the_edge_of_its_set_makes_no_cycle() -> None:
     for x1 in (0.1, -0.1, 0.6, rest, rest * (1.0 + 1e-15), rest * (1.0 + 1e-12)):
         found = find_cycle(LoopSection(loop), np.array([x1, 0.0]))
         assert found in (NoCycle("equilibrium"), NoCycle("time reached"))
+        end = simulate(loop, (x1, 0.0, 0.0), duration=200.0, times=()).end_state
+        assert abs(end[0]) <= rest * (1.0 + 1e-9)
+        assert end[1] + end[2] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_motion_that_comes_to_rest_has_no_derivative() -> None:
