@@ -18,18 +18,25 @@ import numpy as np
 
 from data.findings import Finding, Severity
 from data.recording import Axis, Recording
-from ident.confidence import quantile
 from ident.estimate import Estimate, IdentifiedRobot
-from ident.evidence import Evidence, IdentificationError, gather, require_evidence, run_findings, run_uses
-from ident.frequency_response import LEAST_SPEED_RATIO, FrequencyInertia
-from ident.friction_fit import DIRECTIONS, SIGN
-from ident.friction_map import MapPoint
-from ident.law_shape import shape_findings
-from ident.parameters import UNITS, Parameters, parameters
-from ident.ripple_correction import ripple_findings
-from ident.stribeck_effect import where_it_shows
-from ident.weighting import Weighted, settle, with_inertia
-from ident.withholding import require_enough
+from ident.evidence.frequency_response import LEAST_SPEED_RATIO, FrequencyInertia
+from ident.evidence.friction_map import MapPoint
+from ident.evidence.gathering import (
+    Evidence,
+    IdentificationError,
+    gather,
+    require_evidence,
+    run_findings,
+    run_uses,
+)
+from ident.evidence.ripple_correction import ripple_findings
+from ident.fit.confidence import quantile
+from ident.fit.friction_fit import DIRECTIONS, SIGN
+from ident.fit.law_shape import shape_findings
+from ident.fit.parameters import UNITS, Parameters, parameters
+from ident.fit.stribeck_effect import where_it_shows
+from ident.fit.weighting import Weighted, settle, with_inertia
+from ident.fit.withholding import require_enough
 
 COMPATIBLE = 3.0  # standard errors between two sources of the inertia
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ident.friction_map import MapPoint
+from ident.evidence.friction_map import MapPoint
 from ident.model.friction import StribeckFriction
 
 

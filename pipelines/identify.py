@@ -1,8 +1,8 @@
 """identify: logs into the fitted robot, with everything that shows how it came about.
 
 Writes `robot.json` (`pipelines.results.robot_file`), `friction_map.csv` (a row a point or a run left out,
-columns as the fields of `ident.friction_map.MapPoint`), `fit_report.txt`, Table 1 as `.csv`, `.md` and
-`.tex`, and `figure2.svg`.
+columns as the fields of `ident.evidence.friction_map.MapPoint`), `fit_report.txt`, Table 1 as `.csv`, `.md`
+and `.tex`, and `figure2.svg`.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import astuple, fields, replace
 
 from data.recording import Axis
 from ident.estimate import IdentifiedRobot
-from ident.friction_map import MapPoint
+from ident.evidence.friction_map import MapPoint
 from ident.identification import Identification
 from ident.identification import identify as fit
 from pipelines.recordings import ReadLogs

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
-from ident.friction_map import MapPoint
+from ident.evidence.friction_map import MapPoint
 from ident.model.friction import StribeckCurve
 from ident.model.robot import OneLinkRobot
 from pipelines.report.axis_units import units_of

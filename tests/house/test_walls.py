@@ -36,6 +36,7 @@ def test_every_wall_stands() -> None:
     ("room", "hole"),
     [
         ("data/recording.py", "import ident.estimate"),
+        ("ident/evidence/gathering.py", "import ident.fit.confidence"),
         ("ident/simulation/compiled.py", "import data.recording"),
         ("ident/model/friction.py", "import ident.simulation.compiled"),
         ("compensation/controller.py", "import ident.estimate"),

@@ -8,13 +8,13 @@ from __future__ import annotations
 import numpy as np
 
 from data.recording import FloatArray
-from ident.breakaway import Breakaway, RampLine
-from ident.evidence import Evidence
-from ident.friction_map import SteadyRun
-from ident.hunting import Swing
+from ident.evidence.breakaway import Breakaway, RampLine
+from ident.evidence.friction_map import SteadyRun
+from ident.evidence.gathering import Evidence
+from ident.evidence.hunting import Swing
+from ident.fit.parameters import parameters
+from ident.fit.weighting import settle
 from ident.model.published import asymmetric_robot
-from ident.parameters import parameters
-from ident.weighting import settle
 
 MAPS = 24
 NAMES = ("static_torque", "coulomb_torque", "stribeck_velocity", "viscous_damping")

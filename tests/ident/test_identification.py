@@ -10,7 +10,7 @@ import pytest
 
 from data.recording import Recording
 from ident.estimate import CURVE_PARAMETERS, Estimate
-from ident.evidence import IdentificationError
+from ident.evidence.gathering import IdentificationError
 from ident.identification import Identification, identify
 from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot

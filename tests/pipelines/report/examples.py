@@ -8,7 +8,7 @@ import numpy as np
 
 from compensation.bifurcation import Bifurcation, Branch, Diagram, Point
 from compensation.controller import Gains
-from ident.friction_map import MapPoint
+from ident.evidence.friction_map import MapPoint
 from ident.model import published
 from ident.simulation.trajectory import Marks, Trajectory
 

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data.recording import FloatArray, Recording
-from ident.friction_map import SteadyRun
+from ident.evidence.friction_map import SteadyRun
 
 BLOCKS = 300  # a run, at most
 LEAST_BLOCKS = 24

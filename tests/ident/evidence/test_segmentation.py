@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from data.recording import Recording
-from ident.segmentation import grain, plateaus, rests, slow_spans, stretches
+from ident.evidence.segmentation import grain, plateaus, rests, slow_spans, stretches
 from tests.ident.rigs import Rig
 
 SPEEDS = np.geomspace(0.02, 2.5, 9)

@@ -13,9 +13,9 @@ import numpy as np
 
 from data.findings import Finding, Severity
 from data.recording import FloatArray
-from ident.confidence import Interval
-from ident.evidence import IdentificationError
-from ident.friction_fit import SIGN, Direction, FitData, FrictionFit
+from ident.evidence.gathering import IdentificationError
+from ident.fit.confidence import Interval
+from ident.fit.friction_fit import SIGN, Direction, FitData, FrictionFit
 
 LEAST_SPEEDS = 3  # under v_s, and over 3 v_s
 LOOSE = 0.5  # relative half-width of an interval beyond which sparse speeds are believed no longer

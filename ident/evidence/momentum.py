@@ -22,8 +22,8 @@ import numpy as np
 
 from data.differentiation import differentiate
 from data.recording import FloatArray, Recording
-from ident.breakaway import Breakaway
-from ident.segmentation import grain
+from ident.evidence.breakaway import Breakaway
+from ident.evidence.segmentation import grain
 
 WINDOWS = 8  # a ramp
 LEAST_COUNTS = 12.0  # of travel in the window that a speed is read from

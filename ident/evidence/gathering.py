@@ -10,14 +10,14 @@ import numpy as np
 from data.findings import Finding, LogError, Severity
 from data.protocols import IDENTIFIES, ProtocolName
 from data.recording import Recording
-from ident.breakaway import Breakaway, breakaways
 from ident.estimate import RunUse
-from ident.frequency_response import FrequencyInertia, frequency_inertia
-from ident.friction_map import SteadyRun, steady_runs
-from ident.hunting import SAMPLES, hunts, sensor_noise
-from ident.momentum import Momentum, momentum
-from ident.position_ripple import Wave, find_waves, traces_of
-from ident.ripple_correction import corrected_motions, corrected_runs, corrected_starts
+from ident.evidence.breakaway import Breakaway, breakaways
+from ident.evidence.frequency_response import FrequencyInertia, frequency_inertia
+from ident.evidence.friction_map import SteadyRun, steady_runs
+from ident.evidence.hunting import SAMPLES, hunts, sensor_noise
+from ident.evidence.momentum import Momentum, momentum
+from ident.evidence.position_ripple import Wave, find_waves, traces_of
+from ident.evidence.ripple_correction import corrected_motions, corrected_runs, corrected_starts
 
 
 class IdentificationError(LogError):
@@ -87,7 +87,7 @@ def _rough_inertia(runs: Sequence[SteadyRun], momenta: Sequence[Momentum]) -> fl
 def _without_hunting(
     recordings: Sequence[Recording], runs: Sequence[SteadyRun], inertia: float
 ) -> tuple[SteadyRun, ...]:
-    """The runs, those in which the speed loop hunts left out with the reason (`ident.hunting`)."""
+    """The runs, those in which the speed loop hunts left out with the reason (`ident.evidence.hunting`)."""
     logs = [*_of(recordings, "constant_velocity"), *_of(recordings, "breakaway")]
     noise = sensor_noise([recording.torque for recording in logs]) if logs else 0.0
     kept = []

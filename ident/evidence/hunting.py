@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from data.recording import FloatArray, Recording
-from ident.segmentation import Stretch
+from ident.evidence.segmentation import Stretch
 
 SAMPLES = 50  # over which a swing is looked for
 SPEED_SWING = 0.5  # of the mean speed

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from data.recording import FloatArray
-from ident.friction_map import SteadyRun
+from ident.evidence.friction_map import SteadyRun
 
 TRAVELS = 8  # candidates for lambda
 SPREADS = 60  # candidates for tau

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from data.recording import FloatArray, Recording
-from ident.hunting import SAMPLES, hunts, sensor_noise, swing
-from ident.segmentation import Stretch
+from ident.evidence.hunting import SAMPLES, hunts, sensor_noise, swing
+from ident.evidence.segmentation import Stretch
 
 N = 6000
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ident.variance_model import RunSpread, run_spread
+from ident.fit.variance_model import RunSpread, run_spread
 
 
 def test_no_spread_is_found_where_white_noise_explains_the_residuals() -> None:

@@ -14,10 +14,10 @@ import numpy as np
 
 from data.findings import Finding, Severity
 from data.recording import Axis, FloatArray, Recording
-from ident.breakaway import Breakaway
-from ident.friction_map import SteadyRun
-from ident.momentum import Momentum
-from ident.position_ripple import Wave
+from ident.evidence.breakaway import Breakaway
+from ident.evidence.friction_map import SteadyRun
+from ident.evidence.momentum import Momentum
+from ident.evidence.position_ripple import Wave
 
 NODES = 2000  # places of a run over which a wave is averaged
 

@@ -7,7 +7,7 @@ changes within the run is taken off as J times the slope of the speed, once J is
 
 A run is one datum however many samples it has, since neighbouring samples share the ripple and the speed
 loop's hunting. Its own few blocks cannot tell its error either: that comes from a variance model pooled
-over all runs (`ident.variance_model`), for which each run hands on the white part of its noise.
+over all runs (`ident.fit.variance_model`), for which each run hands on the white part of its noise.
 
 What a run has to survive:
 
@@ -25,8 +25,8 @@ import numpy as np
 
 from data.protocols import ProtocolName
 from data.recording import FloatArray, Recording
-from ident.hunting import Swing, swing
-from ident.segmentation import Stretch, grain, plateaus, rests, stretches
+from ident.evidence.hunting import Swing, swing
+from ident.evidence.segmentation import Stretch, grain, plateaus, rests, stretches
 
 LEAST_COUNTS = 20.0
 BLOCKS = 20  # a window is judged in twentieths

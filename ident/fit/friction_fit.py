@@ -3,8 +3,8 @@ r"""The one stage: both directions' laws and the common inertia from all data at
 The data are magnitudes along the motion:
 
 - steady runs:      u_i - J a_i = F_c + dF exp(-(v_i/v_s)^beta) + b v_i,
-- breakaways:       u_i - u' d  = F_c + dF,           d the time from onset to detection (`ident.breakaway`),
-- momentum:         each window of the motion after breakaway (`ident.momentum`),
+- breakaways:       u_i - u' d  = F_c + dF,           d the time from onset to detection,
+- momentum:         each window of the motion after breakaway,
 - the inertia of the frequency response, as one datum with its error.
 
 All are weighted by real standard errors, so chi-square is what it says and lmfit must not rescale the
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from data.recording import FloatArray
-from ident.momentum import Momentum
+from ident.evidence.momentum import Momentum
 
 Direction = Literal["positive", "negative"]
 DIRECTIONS: Final[tuple[Direction, Direction]] = ("positive", "negative")

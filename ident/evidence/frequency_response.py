@@ -33,7 +33,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from data.recording import FloatArray, Recording
-from ident.segmentation import grain
+from ident.evidence.segmentation import grain
 
 ComplexArray = NDArray[np.complex128]
 

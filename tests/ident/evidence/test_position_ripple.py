@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from data.recording import Recording
-from ident.evidence import gather
-from ident.friction_map import steady_runs
+from ident.evidence.friction_map import steady_runs
+from ident.evidence.gathering import gather
+from ident.evidence.position_ripple import Trace, find_waves, trace
 from ident.identification import identify
-from ident.position_ripple import Trace, find_waves, trace
 from tests.ident.rigs import Rig
 
 SPEEDS = np.geomspace(0.01, 2.5, 10)

@@ -18,10 +18,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ident.confidence import quantile
-from ident.evidence import Evidence
-from ident.friction_fit import DIRECTIONS, Direction, fit_friction
-from ident.weighting import Weighted, reweighted
+from ident.evidence.gathering import Evidence
+from ident.fit.confidence import quantile
+from ident.fit.friction_fit import DIRECTIONS, Direction, fit_friction
+from ident.fit.weighting import Weighted, reweighted
 
 EARNED = 6.0  # fall of chi-square by which a curve has to beat the line
 CLEAR = 8.0  # standard errors of dF and of v_s from zero: nothing to ask then

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from data.recording import FloatArray, Recording
-from ident.segmentation import Stretch, grain, slow_spans, stretches
+from ident.evidence.segmentation import Stretch, grain, slow_spans, stretches
 
 SUSTAINED_COUNTS = 20.0
 ONSET_COUNTS = 3.5  # the first reading beyond is the onset

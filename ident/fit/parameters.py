@@ -9,10 +9,10 @@ import numpy as np
 
 from data.findings import Finding
 from data.recording import Axis, FloatArray
-from ident.confidence import Interval, profiled, quantile, symmetric
 from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate
-from ident.friction_fit import DIRECTIONS, Direction, FitData, FrictionFit, residuals
-from ident.withholding import withheld
+from ident.fit.confidence import Interval, profiled, quantile, symmetric
+from ident.fit.friction_fit import DIRECTIONS, Direction, FitData, FrictionFit, residuals
+from ident.fit.withholding import withheld
 
 UNITS: Mapping[Axis, Mapping[str, str]] = {
     "rotary": {

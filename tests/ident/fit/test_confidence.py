@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import t as student
 
 from data.recording import FloatArray
-from ident.confidence import profiled, quantile, symmetric
+from ident.fit.confidence import profiled, quantile, symmetric
 
 X = np.linspace(0.0, 1.0, 12)
 

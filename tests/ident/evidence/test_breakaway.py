@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from data.recording import Recording
-from ident.breakaway import breakaways
-from ident.friction_fit import Direction
+from ident.evidence.breakaway import breakaways
+from ident.fit.friction_fit import Direction
 from ident.response import breakaway_delay
 from tests.ident.rigs import Rig
 

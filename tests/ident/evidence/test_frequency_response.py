@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 from data.recording import FloatArray, Recording
-from ident.frequency_response import _impedance, frequency_inertia, response_fit
+from ident.evidence.frequency_response import _impedance, frequency_inertia, response_fit
 from tests.ident.rigs import Rig, multisine
 
 J = 0.026

@@ -8,8 +8,8 @@ take off chi-square to what is then left of it, which does not depend on how lar
 from __future__ import annotations
 
 from data.findings import Finding, Severity
-from ident.friction_fit import DIRECTIONS, fit_friction, residuals
-from ident.weighting import Weighted
+from ident.fit.friction_fit import DIRECTIONS, fit_friction, residuals
+from ident.fit.weighting import Weighted
 
 FAR_BETTER = 12.0  # F ratio; by chance under once in ten thousand with 20 data to spare
 

@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from data.recording import FloatArray
-from ident.breakaway import Breakaway
-from ident.evidence import Evidence
-from ident.friction_fit import (
+from ident.evidence.breakaway import Breakaway
+from ident.evidence.gathering import Evidence
+from ident.evidence.momentum import Momentum
+from ident.fit.friction_fit import (
     DIRECTIONS,
     SIGN,
     Direction,
@@ -25,11 +26,10 @@ from ident.friction_fit import (
     friction_torque,
     start_inertia,
 )
+from ident.fit.variance_model import RunSpread, run_spread, white_variance
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
-from ident.momentum import Momentum
 from ident.response import breakaway_delay
-from ident.variance_model import RunSpread, run_spread, white_variance
 
 ROUNDS = 5  # of the steady runs alone
 MOST_ROUNDS = 12  # with the motion

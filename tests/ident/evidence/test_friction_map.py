@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from data.recording import FloatArray, Recording
-from ident.friction_map import steady_runs
+from ident.evidence.friction_map import steady_runs
 from tests.ident.rigs import Rig
 
 

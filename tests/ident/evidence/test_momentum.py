@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from ident.breakaway import breakaways
-from ident.momentum import Momentum, momentum
+from ident.evidence.breakaway import breakaways
+from ident.evidence.momentum import Momentum, momentum
 from tests.ident.rigs import Rig
 
 
