@@ -1,12 +1,10 @@
 """Recordings in, a robot out: the whole identification, in order.
 
 1. Each log is segmented by its protocol: steady runs, breakaways and the motion after them, frequency
-responses.
+responses (`ident.evidence`).
 2. A missing direction, a torque of the wrong sign, or as many parameters as data end it here.
-3. The joint fit is settled without the frequency response; it gives v_s, against which the bias speed of the
-   frequency response is judged, and an inertia of its own.
-4. The frequency response's inertia, as the better source, joins the fit as one datum.
-5. Values get intervals, or are withheld with a reason; every log is listed with its use.
+3. The law is fitted in one stage (`ident.fit`): values get intervals, or are withheld with a reason.
+4. Every log is listed with its use.
 """
 
 from __future__ import annotations
@@ -14,12 +12,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from data.findings import Finding, Severity
 from data.recording import Axis, Recording
 from ident.estimate import Estimate, IdentifiedRobot
-from ident.evidence.frequency_response import LEAST_SPEED_RATIO, FrequencyInertia
+from ident.evidence.frequency_response import FrequencyInertia
 from ident.evidence.friction_map import MapPoint
 from ident.evidence.gathering import (
     Evidence,
@@ -30,15 +26,11 @@ from ident.evidence.gathering import (
     run_uses,
 )
 from ident.evidence.ripple_correction import ripple_findings
-from ident.fit.confidence import quantile
+from ident.fit.assumptions import DEFAULT, Assumptions
 from ident.fit.friction_fit import DIRECTIONS, SIGN
-from ident.fit.law_shape import shape_findings
-from ident.fit.parameters import UNITS, Parameters, parameters
-from ident.fit.stribeck_effect import where_it_shows
-from ident.fit.weighting import Weighted, settle, with_inertia
-from ident.fit.withholding import require_enough
-
-COMPATIBLE = 3.0  # standard errors between two sources of the inertia
+from ident.fit.one_stage import explain
+from ident.fit.parameters import UNITS
+from ident.fit.weighting import Weighted
 
 
 @dataclass(frozen=True)
@@ -51,10 +43,10 @@ class Identification:
     response: FrequencyInertia | None  # for figures, whether the fit used it or not
 
 
-def identify(recordings: Sequence[Recording], *, free_beta: bool = False) -> Identification:
+def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFAULT) -> Identification:
     """Fit the friction law of each direction and the inertia to the recordings of one rig.
 
-    beta is 1 unless `free_beta`. Raises `IdentificationError` where no law can be had: a direction without
+    Raises `IdentificationError` where no law can be had: a direction without
     usable runs (E-DIRECTION), a torque of the wrong sign (E-SIGN), too few data (E-FEW).
     """
     if not recordings:
@@ -62,34 +54,15 @@ def identify(recordings: Sequence[Recording], *, free_beta: bool = False) -> Ide
     axis = _axis(recordings)
     evidence = gather(recordings)
     require_evidence(recordings, evidence)
-    weighted = where_it_shows(evidence, settle(evidence, free_beta=free_beta), free_beta=free_beta)
-    per_direction = 5 if free_beta else 4
-    for direction in DIRECTIONS:
-        require_enough(weighted.data, direction, parameters=per_direction)
-    unit = UNITS[axis]["inertia"]
-    dof = _degrees(weighted)
-    sources: dict[str, Estimate] = {}
+    explained = explain(evidence, axis=axis, assumptions=assumptions)
+    values = explained.values
     notes = [
         *_log_findings(recordings),
         *run_findings(evidence),
         *ripple_findings(evidence.waves, axis),
         *_missing_tests(evidence),
+        *explained.findings,
     ]
-    if evidence.momenta:
-        sources["breakaway"] = parameters(weighted.data, weighted.fit, axis=axis, dof=dof).inertia
-    if evidence.response is not None:
-        response, refusal = _response_source(evidence.response, weighted, unit=unit)
-        sources["frequency_response"] = response
-        if refusal is not None:
-            notes.append(refusal)
-        else:
-            datum = (evidence.response.inertia, evidence.response.stderr)
-            weighted = with_inertia(evidence, weighted, datum, free_beta=free_beta)
-            dof = _degrees(weighted)
-        notes += _disagreement(sources, unit)
-    values = parameters(weighted.data, weighted.fit, axis=axis, dof=dof)
-    notes += [] if free_beta else shape_findings(weighted)
-    notes += [*values.findings, *_fit_findings(weighted), *_offset_finding(values, axis)]
     robot = IdentifiedRobot(
         inertia=values.inertia,
         positive=values.curves["positive"],
@@ -104,10 +77,11 @@ def identify(recordings: Sequence[Recording], *, free_beta: bool = False) -> Ide
         runs=run_uses(recordings, evidence),
         notes=tuple(notes),
         covariance=values.covariance,
-        inertia_sources=sources,
+        inertia_sources=explained.inertia_sources,
         axis=axis,
         simulated=any(recording.simulated for recording in recordings),
     )
+    weighted = explained.weighted
     return Identification(robot, friction_map(evidence, weighted), weighted.fit.report, evidence.response)
 
 
@@ -164,13 +138,6 @@ def _axis(recordings: Sequence[Recording]) -> Axis:
     return recordings[0].axis
 
 
-def _degrees(weighted: Weighted) -> int:
-    """Data beyond the free parameters: runs, breakaways, and one datum a ramp's motion."""
-    data = weighted.data
-    friction = sum(name != "inertia" for name in weighted.fit.free)
-    return max(data.torque.size + data.start_torque.size - friction, 1)
-
-
 def _log_findings(recordings: Sequence[Recording]) -> list[Finding]:
     return [finding for recording in recordings for finding in recording.findings]
 
@@ -189,80 +156,3 @@ def _missing_tests(evidence: Evidence) -> list[Finding]:
         text = "no frequency response was recorded: the inertia rests on the motion after breakaway, if any."
         found.append(Finding("E-TESTS", Severity.WARN, text))
     return found
-
-
-def _response_source(
-    response: FrequencyInertia, weighted: Weighted, *, unit: str
-) -> tuple[Estimate, Finding | None]:
-    """The inertia of the frequency response; withheld where its lowest speed lies in the Stribeck range."""
-    for fit in response.fits:
-        direction = "positive" if fit.bias_speed > 0 else "negative"
-        velocity = weighted.fit.values[f"{direction}_stribeck_velocity"]
-        effect = weighted.fit.values[f"{direction}_stribeck_torque"] > 0
-        if not effect or fit.lowest_speed >= LEAST_SPEED_RATIO * velocity:
-            continue
-        text = (
-            f"{fit.log}: the speed falls to {fit.lowest_speed:.3g}, under {LEAST_SPEED_RATIO:g} v_s = "
-            f"{LEAST_SPEED_RATIO * velocity:.3g}: friction there is no damping and the inertia may be wrong "
-            "by tens "
-            "of percent. Raise the bias speed or lower the excitation."
-        )
-        return Estimate(None, unit, withheld=f"E-LOWSPEED: {text}"), Finding(
-            "E-LOWSPEED", Severity.WITHHOLD, text, fit.log
-        )
-    reach = quantile(response.dof) * response.stderr
-    interval = (response.inertia - reach, response.inertia + reach)
-    return Estimate(response.inertia, unit, response.stderr, interval), None
-
-
-def _disagreement(sources: dict[str, Estimate], unit: str) -> list[Finding]:
-    values = [(name, source.value, source.stderr) for name, source in sources.items()]
-    known = [(name, value, error) for name, value, error in values if value is not None and error is not None]
-    if len(known) < 2:
-        return []
-    (one, first, first_error), (two, second, second_error) = known
-    distance = abs(first - second) / float(np.hypot(first_error, second_error))
-    if distance <= COMPATIBLE:
-        return []
-    text = (
-        f"the inertia from {one} is {first:.4g} and from {two} {second:.4g} {unit}, {distance:.1f} standard "
-        "errors "
-        "apart: a scale of the torque that changes, a flexible link or friction that varies with place "
-        "would do it. "
-        "The frequency response is the one reported."
-    )
-    return [Finding("E-LACKOFFIT", Severity.WARN, text)]
-
-
-def _fit_findings(weighted: Weighted) -> list[Finding]:
-    other = weighted.fit.other_minimum
-    if other is None:
-        return []
-    pairs = ", ".join(
-        f"{direction} v_s = {weighted.fit.values[f'{direction}_stribeck_velocity']:.3g} or "
-        f"{other[f'{direction}_stribeck_velocity']:.3g}"
-        for direction in DIRECTIONS
-    )
-    return [
-        Finding(
-            "E-LOCAL", Severity.WARN, f"two minima fit equally well: {pairs}. More speeds around v_s tell."
-        )
-    ]
-
-
-def _offset_finding(values: Parameters, axis: Axis) -> list[Finding]:
-    pair = [values.curves[direction]["coulomb_torque"] for direction in DIRECTIONS]
-    if any(estimate.value is None or estimate.stderr is None for estimate in pair):
-        return []
-    forward, backward = ((e.value or 0.0, e.stderr or 0.0) for e in pair)
-    difference, error = forward[0] - backward[0], float(np.hypot(forward[1], backward[1]))
-    if abs(difference) <= COMPATIBLE * error:
-        return []
-    text = (
-        f"F_c differs by {difference:.3g} {UNITS[axis]['torque_offset']} between the directions: an "
-        "asymmetry of "
-        f"friction, or an actuator offset of {0.5 * difference:.3g}; no torque-driven experiment separates "
-        "them. "
-        "The laws are those of the torque as logged."
-    )
-    return [Finding("E-OFFSET", Severity.WARN, text)]

@@ -23,6 +23,7 @@ from pipelines.terminal import options as option
 from pipelines.terminal.refusals import ends_well
 
 if TYPE_CHECKING:
+    from ident.fit.assumptions import Assumptions
     from pipelines.results.folder import Owner, ResultFolder
     from pipelines.settings.gains import GainOptions
 
@@ -114,6 +115,9 @@ def identify(
     campaign: option.CampaignFile,
     out: option.Out = None,
     free_beta: option.FreeBeta = False,
+    choose_beta: option.ChooseBeta = False,
+    one_law: option.OneLaw = False,
+    per_direction: option.PerDirection = False,
     salvage: option.Salvage = False,
     jobs: option.Jobs = None,
     quiet: option.Quiet = False,
@@ -128,7 +132,8 @@ def identify(
 
     loaded = load_campaign(campaign)
     folder = open_results(_place(out, loaded.owner), loaded.owner, force=force)
-    options = RunOptions(free_beta=free_beta, salvage=salvage, jobs=jobs)
+    assumptions = _assumptions(free_beta, choose_beta, one_law, per_direction)
+    options = RunOptions(assumptions=assumptions, salvage=salvage, jobs=jobs)
     with shown_progress(quiet=quiet) as progress:
         missing = identify_campaign(loaded, folder, options, progress=progress)
     _answer_table(folder, missing, quiet=quiet, as_json=as_json)
@@ -320,6 +325,9 @@ def run(
     campaign: option.CampaignFile,
     out: option.Out = None,
     free_beta: option.FreeBeta = False,
+    choose_beta: option.ChooseBeta = False,
+    one_law: option.OneLaw = False,
+    per_direction: option.PerDirection = False,
     salvage: option.Salvage = False,
     over: option.Over = None,
     law: option.Law = "per-direction",
@@ -344,7 +352,7 @@ def run(
     loaded = load_campaign(campaign)
     folder = open_results(_place(out, loaded.owner), loaded.owner, force=force)
     options = RunOptions(
-        free_beta=free_beta,
+        assumptions=_assumptions(free_beta, choose_beta, one_law, per_direction),
         salvage=salvage,
         law=law,
         compensator=compensator,
@@ -391,6 +399,22 @@ def _place(out: Path | None, owner: Owner) -> Path:
     """The result folder: as said, else by the campaign's name, which never leads out of the outputs."""
     name = re.sub(r"[^\w.-]+", "_", owner.campaign).strip(". ")
     return out or OUTPUTS / (name or "campaign")
+
+
+def _assumptions(free_beta: bool, choose_beta: bool, one_law: bool, per_direction: bool) -> Assumptions:
+    from ident.fit.assumptions import Assumptions, LawsChoice, ShapeChoice
+    from pipelines.exit_status import UsageError
+
+    if free_beta and choose_beta:
+        raise UsageError("--free-beta and --choose-beta: beta is either fitted or chosen; give one of them")
+    if one_law and per_direction:
+        raise UsageError(
+            "--one-law and --per-direction: a law for each direction and a torque offset cannot both be "
+            "told from torque-driven experiments; give one of them"
+        )
+    shape: ShapeChoice = "free" if free_beta else "chosen" if choose_beta else "fixed"
+    laws: LawsChoice = "one" if one_law else "each" if per_direction else "default"
+    return Assumptions(shape=shape, laws=laws)
 
 
 def _gains(

@@ -14,6 +14,7 @@ from dataclasses import astuple, fields, replace
 from data.recording import Axis
 from ident.estimate import IdentifiedRobot
 from ident.evidence.friction_map import MapPoint
+from ident.fit.assumptions import DEFAULT, Assumptions
 from ident.identification import Identification
 from ident.identification import identify as fit
 from pipelines.recordings import ReadLogs
@@ -22,12 +23,12 @@ from pipelines.results.robot_file import write_robot
 from pipelines.settings.loop import LoopDefaults
 
 
-def identify(logs: ReadLogs, *, free_beta: bool = False) -> Identification:
+def identify(logs: ReadLogs, *, assumptions: Assumptions = DEFAULT) -> Identification:
     """The robot behind the recordings; runs that the campaign excludes are listed with their reason.
 
     Raises `LogError` where the recordings can give no robot at all.
     """
-    found = fit(logs.recordings, free_beta=free_beta)
+    found = fit(logs.recordings, assumptions=assumptions)
     runs = tuple(sorted((*found.robot.runs, *logs.excluded), key=lambda use: use.log))
     return replace(found, robot=replace(found.robot, runs=runs))
 

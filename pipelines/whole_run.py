@@ -19,6 +19,7 @@ from compensation.controller import Gains
 from data.findings import Severity
 from data.recording import Recording
 from ident.estimate import IdentifiedRobot
+from ident.fit.assumptions import DEFAULT, Assumptions
 from pipelines.compare import compare, write_comparison, write_figure10
 from pipelines.design import design, write_design
 from pipelines.executors.processes import opened_map
@@ -52,7 +53,7 @@ SWEEP_POINTS = 101
 class RunOptions:
     """What the command line said of a run."""
 
-    free_beta: bool = False
+    assumptions: Assumptions = DEFAULT
     salvage: bool = False
     law: LawChoice = "per-direction"
     compensator: LawChoice | None = None
@@ -66,7 +67,8 @@ class RunOptions:
         said = {f"{name}_gain": getattr(self.gains, name) for name in ("compensation", "observer")}
         said |= {name: getattr(self.gains, name) for name in ("proportional", "derivative", "sample_period")}
         return {
-            "free_beta": self.free_beta,
+            "shape": self.assumptions.shape,
+            "laws": self.assumptions.laws,
             "salvage": self.salvage,
             "law": self.law,
             "compensator": self.compensator,
@@ -161,7 +163,7 @@ def _identified(
     campaign: Campaign, logs: ReadLogs, folder: ResultFolder, options: RunOptions, progress: Progress
 ) -> tuple[list[str], IdentifiedRobot]:
     tick = progress.stage("identifying", 1)
-    found = identify(logs, free_beta=options.free_beta)
+    found = identify(logs, assumptions=options.assumptions)
     tick(1)
     write_identification(
         found, folder, loop=campaign.loop_defaults(), axis=campaign.rig.axis, truth=read_truth(campaign)

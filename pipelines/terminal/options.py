@@ -40,6 +40,13 @@ Over = Annotated[
     typer.Option("--over", help="What to sweep: r=0.8:1.2:200 or L=20:120:101.", show_default=False),
 ]
 FreeBeta = Annotated[bool, typer.Option("--free-beta", help="Fit the Stribeck shape too, instead of 1.")]
+ChooseBeta = Annotated[
+    bool, typer.Option("--choose-beta", help="Fit the Stribeck shape where the data earn it (AICc), else 1.")
+]
+OneLaw = Annotated[bool, typer.Option("--one-law", help="One law for both directions, and a torque offset.")]
+PerDirection = Annotated[
+    bool, typer.Option("--per-direction", help="A law for each direction, and no torque offset.")
+]
 
 Law = Annotated[
     Literal["per-direction", "mean"],

@@ -11,6 +11,7 @@ import pytest
 from data.recording import Recording
 from ident.estimate import CURVE_PARAMETERS, Estimate
 from ident.evidence.gathering import IdentificationError
+from ident.fit.assumptions import Assumptions
 from ident.identification import Identification, identify
 from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
@@ -150,7 +151,7 @@ def test_beta_is_fixed_unless_it_is_freed() -> None:
     fixed = identify(logs).robot.positive["stribeck_shape"]
     assert fixed.fixed
     assert fixed.value == 1.0
-    freed = identify(logs, free_beta=True).robot.positive["stribeck_shape"]
+    freed = identify(logs, assumptions=Assumptions(shape="free")).robot.positive["stribeck_shape"]
     assert not freed.fixed
     assert freed.value == pytest.approx(1.0, abs=0.1)
     assert _inside(freed, 1.0)
