@@ -148,7 +148,8 @@ def resolve(
     if minus < 0.0:
         return -1
     if plus == 0.0 and minus == 0.0:
-        for side in (1, -1):
+        own = -1 if signs[index] < 0 else 1
+        for side in (own, -own):
             leaving_rate(system, surfaces, index, side, signs, state, parameters, rate)
             for j in range(state.size):
                 rate[state.size + j] = state[j] + TANGENT_STEP * rate[j]

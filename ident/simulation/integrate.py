@@ -35,7 +35,7 @@ from ident.simulation.filippov_system import (
 )
 from ident.simulation.polynomials import evaluate, sum_up
 from ident.simulation.taylor import ORDER
-from ident.simulation.touching import back_along, has_left, turn_back
+from ident.simulation.touching import back_along, drive_across, has_left, turn_back
 
 TIME_REACHED: Final = 0
 EQUILIBRIUM: Final = 1
@@ -125,7 +125,7 @@ def integrate(
     events = 0
     found = 0
     stalled = 0
-    touched = -1  # a surface that was turned back from, and has not been left since
+    touched = -1  # a surface that was met but not crossed, and has not been left since
     suggested = 1e-2
     crawl = SHORTEST_CRAWL
     for step in range(settings.step_limit):
@@ -202,6 +202,10 @@ def integrate(
             reached = _meet(system, surfaces, parameters, surface, state, signs, contact, rate)
             if signs[surface] == arrived_from:
                 _hold(system, surfaces, parameters, surface, state, signs, contact, rate)
+                if reached == 1 and signs[surface] == arrived_from:
+                    if surface == touched:
+                        drive_across(surface, signs, contact)
+                    touched = surface
             elif reached == 1 and signs[surface] == -arrived_from and surface != touched:
                 time += turn_back(
                     system, surfaces, parameters, surface, arrived_from, settings.tolerance,
@@ -276,7 +280,7 @@ def _hold(
     """
     here = leaving_rate(system, surfaces, surface, signs[surface], signs, state, parameters, rate)
     there = leaving_rate(system, surfaces, surface, -signs[surface], signs, state, parameters, rate)
-    if abs(here) <= BALANCE * abs(there):
+    if abs(here) < BALANCE * abs(there):
         signs[surface] = 0
         contact[surface] = 0
 

@@ -58,6 +58,12 @@ def turn_back(
 
 
 @compiled
+def drive_across(surface: int, signs: Signs, contact: Signs) -> None:
+    """Cross a surface that a motion comes to again, whatever its rate there: it is that of its errors."""
+    signs[surface], contact[surface] = -signs[surface], 2
+
+
+@compiled
 def back_along(state: FloatArray, rate: FloatArray, time: float, out: FloatArray) -> None:
     """The state (n,) a short `time` [s] ago, at a rate (n or more,)."""
     for j in range(state.size):
