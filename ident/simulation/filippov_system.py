@@ -80,6 +80,15 @@ def assign(out: NDArray[Any], values: NDArray[Any]) -> None:
         out[i] = values[i]
 
 
+@compiled
+def largest(values: FloatArray) -> float:
+    """The largest magnitude among values (n,)."""
+    size = 0.0
+    for i in range(values.size):
+        size = max(size, abs(values[i]))
+    return size
+
+
 @specialised
 def switching_value(surfaces: Surfaces, index: int, state: FloatArray) -> float:
     """h_index at a state."""

@@ -28,6 +28,7 @@ from ident.simulation.filippov_system import (
     Signs,
     Surfaces,
     assign,
+    largest,
     leaving_rate,
     project,
     resolve,
@@ -59,6 +60,7 @@ HELD_EVENTS: Final = (
 )
 SHORTEST_CRAWL: Final = 1e-9  # [s] of that holding, doubled each time
 LONGEST_CRAWL: Final = 1e-2  # [s]
+VANISHED: Final = 1e-290  # numbers that a motion can decay to: little more than the smallest there are
 BALANCE: Final = 1e-9  # of the rate on the other side: so slow a departure may be rounding
 
 
@@ -87,7 +89,7 @@ class Record(NamedTuple):
 class Progress(NamedTuple):
     """Where an integration stands."""
 
-    time: float  # of the equilibrium: when the last slide began
+    time: float  # of the equilibrium: when the last slide began, or the motion was over
     reason: int  # index into END_REASONS
     outputs: int  # how many of the wanted times are done
     events: int  # how many events are stored
@@ -113,7 +115,8 @@ def integrate(
     `memory` is of the shape that `memory_shape` tells.
 
     Output times before `time` are left alone. A state that slides for ever is reported as an equilibrium at
-    once, with its later outputs filled in; `state` is then where it tends to.
+    once, with its later outputs filled in; `state` is then where it tends to. So is a motion that decays
+    below all numbers, to where the field is zero.
     """
     n, m = state.size, signs.size
     polynomials, work = memory[: n + m], memory[n + m : n + m + WORK_ROWS]
@@ -191,6 +194,12 @@ def integrate(
                 evaluate(polynomials, n, degree, part, after)
             stalled = stalled + 1 if now == time else 0
             time = now
+            if _dies_out(system, signs, parameters, state, after, rate):
+                assign(state, rate[:n])
+                while output < wanted and record.times[output] <= settings.end:
+                    assign(record.states[output], state)
+                    output += 1
+                return Progress(time, EQUILIBRIUM, output, events, step + 1)
             assign(state, after)
             for i in range(m):
                 contact[i] = 0
@@ -252,6 +261,25 @@ def _finite(spread: FloatArray) -> bool:
     for i in range(spread.size):
         total += spread[i]
     return bool(np.isfinite(total))
+
+
+@specialised
+def _dies_out(
+    system: FilippovSystem,
+    signs: Signs,
+    parameters: FloatArray,
+    state: FloatArray,
+    after: FloatArray,
+    rate: FloatArray,
+) -> bool:
+    """Whether a step has led below all numbers, to zero and a field that is zero there, as `rate` then is."""
+    n = state.size
+    if not largest(after) < VANISHED <= largest(state):
+        return False
+    for j in range(n):
+        rate[n + j] = 0.0
+    system.field(signs, rate[n : 2 * n], parameters, rate)
+    return largest(rate[:n]) == 0.0
 
 
 @specialised

@@ -15,6 +15,7 @@ from ident.simulation.filippov_system import (
     FloatArray,
     Signs,
     Surfaces,
+    largest,
     leaving_rate,
     project,
     switching_value,
@@ -79,7 +80,4 @@ def has_left(surfaces: Surfaces, surface: int, tolerance: float, state: FloatArr
 @compiled
 def _error(tolerance: float, state: FloatArray) -> float:
     """What a step may err by: the tolerance is relative to the largest component of the state."""
-    size = 0.0
-    for j in range(state.size):
-        size = max(size, abs(state[j]))
-    return tolerance * size
+    return tolerance * largest(state)

@@ -310,6 +310,23 @@ def test_a_touch_is_met_once_and_then_crossed(start: tuple[float, float, float])
         np.testing.assert_allclose(run.end_state, truth.end_state, atol=10.0 * tolerance**0.5, rtol=0)
 
 
+@pytest.mark.parametrize("shape", [0.7, 1.0, 1.5, 2.0])
+@pytest.mark.parametrize("damping", [0.02, 0.5])  # swings, creeps
+def test_a_motion_that_decays_below_all_numbers_is_over(shape: float, damping: float) -> None:
+    """At r = 1 without an observer error: a linear oscillator, which tends to the set point for ever."""
+    curve = replace(symmetric_robot().friction.positive, stribeck_shape=shape)
+    robot = OneLinkRobot(0.026, StribeckFriction.symmetric(curve))
+    case = ClosedLoop(robot, Controller(Gains(0.4, damping, 73.5, 1.0), robot))
+    rates = np.roots([0.026, curve.viscous_damping + damping, 0.4]).real
+    over = 290.0 * math.log(10.0) / -rates.max()
+    run = simulate(case, START, duration=2.0 * over, times=[0.9 * over, 1.1 * over, 2.0 * over])
+    assert run.end_reason == "equilibrium"
+    assert run.end_time == pytest.approx(over, rel=0.01)
+    assert 0.0 < np.max(np.abs(run.state[0])) < 1e-250
+    assert not run.state[1:].any()
+    assert not run.end_state.any()
+
+
 @pytest.mark.parametrize("shape", [0.5, 0.7, 0.9])
 def test_laws_steep_at_rest_converge_with_the_power_beta_of_the_tolerance(shape: float) -> None:
     curve = replace(symmetric_robot().friction.positive, stribeck_shape=shape)
