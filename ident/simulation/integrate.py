@@ -169,9 +169,8 @@ def integrate(
             if not _finite(spread):
                 return Progress(time, NOT_FINITE, output, events, step)
             part = 1.0
-            for i in range(m):
-                if contact[i] == 0 and _is_clear(surfaces, i, signs[i], state, spread):
-                    continue
+            near = 0 if _is_clear(surfaces, signs, contact, state, spread) else m
+            for i in range(near):
                 _switching_polynomial(surfaces, i, n, degree, polynomials)
                 at = first_crossing(polynomials[n + i], degree, signs[i], contact[i], work[0])
                 if at <= part and (surface < 0 or at < part):
@@ -283,12 +282,21 @@ def _dies_out(
 
 
 @specialised
-def _is_clear(surfaces: Surfaces, index: int, sign: int, state: FloatArray, spread: FloatArray) -> bool:
-    """Whether a step cannot meet the surface: the one test that most steps need."""
-    reach = 0.0
-    for j in range(state.size):
-        reach += abs(surfaces.rows[index, j]) * spread[j]
-    return bool(sign * switching_value(surfaces, index, state) > reach)
+def _is_clear(
+    surfaces: Surfaces, signs: Signs, contact: Signs, state: FloatArray, spread: FloatArray
+) -> bool:
+    """Whether a step can meet no surface: the one test that most steps need."""
+    n = state.size
+    near = 0
+    for i in range(signs.size):
+        value, reach = surfaces.rows[i, n], 0.0
+        for j in range(n):
+            factor = surfaces.rows[i, j]
+            value += factor * state[j]
+            reach += abs(factor) * spread[j]
+        if contact[i] != 0 or not signs[i] * value > reach:
+            near += 1
+    return near == 0
 
 
 @specialised
