@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.text import Text
-from scipy.optimize import minimize
+from scipy.optimize import LinearConstraint, minimize
 
 from data.recording import FloatArray
 from pipelines.report.marked_values import mark_values, spread
@@ -28,8 +28,12 @@ def test_places_keep_apart_and_on_the_axis(wanted: FloatArray) -> None:
 
 def test_places_are_the_nearest_that_there_are() -> None:
     wanted, room = np.array([0.5, 0.52, 0.53, 0.9]), 0.1
-    keep_apart = {"type": "ineq", "fun": lambda place: np.diff(place) - room}
-    best = minimize(lambda place: np.sum((place - wanted) ** 2), wanted, constraints=keep_apart)
+    keep_apart = LinearConstraint(np.diff(np.eye(4), axis=0), room, np.inf)
+
+    def missed(place: FloatArray) -> float:
+        return float(np.sum((place - wanted) ** 2))
+
+    best = minimize(missed, wanted, constraints=keep_apart, method="SLSQP")
     np.testing.assert_allclose(spread(wanted, room), best.x, atol=1e-6)
 
 
@@ -39,8 +43,9 @@ def test_no_name_lies_on_another(count: int) -> None:
     axes = figure.subplots()
     axes.set_xlim(0.8, 1.2)
     mark_values(axes, "r", list(1.0 + 2e-3 * np.arange(count) / max(count / 50, 1)))
-    renderer = FigureCanvasAgg(figure).get_renderer()
-    figure.draw(renderer)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()  # type: ignore[no-untyped-call]
+    renderer = canvas.get_renderer()  # type: ignore[no-untyped-call]
     frame = axes.get_window_extent(renderer)
     boxes = [Text.get_window_extent(name, renderer) for name in axes.texts]
     assert boxes
