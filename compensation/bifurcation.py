@@ -34,6 +34,7 @@ from compensation.rest_pieces import (
     present,
     rest_pieces,
 )
+from ident.model.doors import expect
 from ident.model.friction import ModelError
 from ident.model.numbers import is_one_of, real_array, shown
 from ident.simulation.filippov_system import FloatArray
@@ -91,6 +92,7 @@ def diagram(loop: ClosedLoop, parameter: Parameter, values: ArrayLike) -> Diagra
     ModelError
         If the parameter is unknown, or the values are no ascending finite numbers >= 0.
     """
+    expect("loop", loop, ClosedLoop, "eq 8")
     if not is_one_of(parameter, ("r", "L")):
         raise ModelError(f"parameter is {shown(parameter)}: a diagram is drawn over 'r' or 'L' (eqs 6-7)")
     grid = real_array(values)
