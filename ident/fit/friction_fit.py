@@ -26,6 +26,7 @@ from scipy.optimize import nnls
 
 from data.recording import FloatArray
 from ident.evidence.momentum import Momentum
+from ident.fit.ramp_rates import RateTrend
 
 Direction = Literal["positive", "negative"]
 DIRECTIONS: Final[tuple[Direction, Direction]] = ("positive", "negative")
@@ -48,12 +49,13 @@ class FitData:
     acceleration: FloatArray  # (n,) along the motion [rad/s^2]
     run_stderr: FloatArray  # (n,) [N m]
     start_direction: NDArray[np.int64]  # (m,)
-    start_torque: FloatArray  # (m,) less the ramp's rise up to the detection [N m]
+    start_torque: FloatArray  # (m,) at the onset and at zero ramp rate [N m]
     start_stderr: FloatArray  # (m,) [N m]
     momenta: tuple[Momentum, ...]
     whitening: tuple[FloatArray, ...]  # (k, k) for each momentum: the inverse square root of its covariance
     inertia: tuple[float, float] | None  # from the frequency response, with its standard error
     lines: tuple[Direction, ...] = ()  # directions without Stribeck effect: dF raises their breakaways alone
+    trend: RateTrend | None = None  # over the ramp rates, that the start torques are less of
 
     @property
     def has_inertia(self) -> bool:

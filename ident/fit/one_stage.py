@@ -19,10 +19,12 @@ from ident.estimate import Estimate
 from ident.evidence.frequency_response import LEAST_SPEED_RATIO, FrequencyInertia
 from ident.evidence.gathering import Evidence
 from ident.fit.assumptions import Assumptions
+from ident.fit.censoring import with_bounds
 from ident.fit.confidence import quantile
 from ident.fit.friction_fit import DIRECTIONS
 from ident.fit.law_shape import shape_findings
 from ident.fit.parameters import UNITS, Parameters, parameters
+from ident.fit.ramp_rates import trend_finding
 from ident.fit.stribeck_effect import where_it_shows
 from ident.fit.weighting import Weighted, settle, with_inertia
 from ident.fit.withholding import require_enough
@@ -65,8 +67,10 @@ def explain(evidence: Evidence, *, axis: Axis, assumptions: Assumptions) -> Expl
             weighted = with_inertia(evidence, weighted, datum, free_beta=free_beta)
             dof = _degrees(weighted)
         findings += _disagreement(sources, unit)
-    values = parameters(weighted.data, weighted.fit, axis=axis, dof=dof)
+    values = with_bounds(parameters(weighted.data, weighted.fit, axis=axis, dof=dof), evidence)
     findings += [] if free_beta else shape_findings(weighted)
+    if weighted.data.trend is not None:
+        findings.append(trend_finding(weighted.data.trend, unit=UNITS[axis]["static_torque"]))
     findings += [*values.findings, *_fit_findings(weighted), *_offset_finding(values, axis)]
     return Explained(weighted, values, sources, tuple(findings))
 
