@@ -4,7 +4,8 @@
 responses (`ident.evidence`).
 2. A missing direction, a torque of the wrong sign, or as many parameters as data end it here.
 3. The law is fitted in one stage (`ident.fit`): values get intervals, or are withheld with a reason.
-4. Every log is listed with its use.
+4. What was fitted is predicted from the rest (`ident.validation`).
+5. Every log is listed with its use.
 """
 
 from __future__ import annotations
@@ -26,10 +27,12 @@ from ident.evidence.gathering import (
 )
 from ident.evidence.ripple_correction import ripple_findings
 from ident.fit.assumptions import DEFAULT, Assumptions
+from ident.fit.breakaway_summary import BreakawaySummary, breakaway_summaries
 from ident.fit.friction_fit import DIRECTIONS, SIGN
 from ident.fit.one_stage import explain
 from ident.fit.parameters import UNITS
 from ident.fit.weighting import Weighted
+from ident.validation.summary import Validation, validate
 
 
 @dataclass(frozen=True)
@@ -41,6 +44,8 @@ class Identification:
     fit_report: str  # lmfit's own
     evidence: Evidence  # used or not
     weighted: Weighted
+    breakaways: tuple[BreakawaySummary, ...]
+    validation: Validation
 
 
 def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFAULT) -> Identification:
@@ -83,7 +88,15 @@ def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFA
     )
     weighted = explained.weighted
     points = friction_map(evidence, weighted)
-    return Identification(robot, points, weighted.fit.report, evidence, weighted)
+    return Identification(
+        robot=robot,
+        friction_map=points,
+        fit_report=weighted.fit.report,
+        evidence=evidence,
+        weighted=weighted,
+        breakaways=breakaway_summaries(evidence, weighted.data),
+        validation=validate(recordings, evidence, weighted),
+    )
 
 
 def friction_map(evidence: Evidence, weighted: Weighted) -> tuple[MapPoint, ...]:
