@@ -243,7 +243,8 @@ def _name(loop: ClosedLoop, parameter: Parameter, last: Place, beyond: Place) ->
     (value, cycle), (at, other) = last, beyond
     fewer, more = sorted((cycle.returns, other.returns))
     name = "limit cycle jumps"
-    if _is_symmetric(cycle) != _is_symmetric(other):
+    even = LoopSection(loop).symmetric
+    if even and fewer % 2 != more % 2:  # an odd number of half turns makes a symmetric cycle
         name = "symmetry breaking"
     elif more == 2 * fewer and distance(replace(cycle, period=other.period), other) < DOUBLED:
         name = "period doubling"
@@ -252,10 +253,6 @@ def _name(loop: ClosedLoop, parameter: Parameter, last: Place, beyond: Place) ->
     )
     graze = parting(here, there, cycle.period)
     return name if graze is None else f"{name}: {graze}"
-
-
-def _is_symmetric(cycle: Cycle) -> bool:
-    return abs(cycle.x1_min + cycle.x1_max) <= ROUNDING * cycle.amplitude
 
 
 def _changes_of_modes(
