@@ -25,7 +25,7 @@ from compensation.loop_tables import Parameter, tables_over
 from compensation.orbits.periodic_orbits import Cycle, NoCycle
 from ident.simulation.filippov_system import FloatArray
 
-TRIALS: Final = 5  # values of a symmetric loop at which a cycle is looked for beside what was found
+TRIALS: Final = 3  # values of a symmetric loop at which a cycle is looked for beside what was found
 SAME_CYCLE: Final = 1e-6  # relative difference of extremes and period, at least
 SAME_POINTS: Final = 30.0  # times the accuracy of the map, in which cycles are one
 
@@ -52,10 +52,11 @@ def _lead_on(
     same, last = _same(LoopSection(loop)), grid.size - 1
     for step in range(1, grid.size):
         index, before = (step, step - 1) if upwards else (last - step, last - step + 1)
-        here = found[index]
+        here, value = found[index], float(grid[index])
         for cycle in found[before]:
             if len(here) < len(found[before]) or all(cycle.returns != one.returns for one in here):
-                _add(here, cycle_near(loop, parameter, float(grid[index]), cycle), same)
+                at = LoopSection(with_gain(loop, parameter, value))
+                _add_with_mirror(here, settled(loop, parameter, value, cycle.point), at, same)
 
 
 def _look_beside(
@@ -70,9 +71,14 @@ def _look_beside(
 
 
 def cycle_near(loop: ClosedLoop, parameter: Parameter, value: float, cycle: Cycle) -> Cycle | NoCycle:
-    """The cycle at a value of the gain to which another value's cycle leads."""
+    """The cycle at a value of the gain to which another value's cycle leads.
+
+    Of mirror images it is the nearer one, where either continues the other value's cycle.
+    """
     found = settled(loop, parameter, value, cycle.point)
-    if not isinstance(found, Cycle) or not _has_mirror(found, LoopSection(loop)):
+    if not isinstance(found, Cycle) or found.returns != cycle.returns:
+        return found
+    if not _has_mirror(found, LoopSection(loop)):
         return found
     image = mirrored(found, LoopSection(with_gain(loop, parameter, value)))
     return min(found, image, key=lambda one: distance(one, cycle))

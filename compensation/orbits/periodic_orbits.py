@@ -31,6 +31,7 @@ NEWTON_STEPS: Final = 12
 SAME_POINT: Final = 1e-7  # relative distance of points of a converged cycle that are one
 VANISHED: Final = 1e-9  # of the start: what has become as small decays
 NEAR: Final = 1e-3  # relative distance from which shooting is tried
+UNREPEATED: Final = "no repetition within"
 NO_DERIVATIVE: Final = "the return has no derivative that leads on"
 
 
@@ -88,6 +89,11 @@ class NoCycle:
     end_reason: str
 
 
+def is_undecided(found: Cycle | NoCycle) -> bool:
+    """Whether the motion neither repeats nor comes to rest as far as it was followed."""
+    return isinstance(found, NoCycle) and found.end_reason.startswith(UNREPEATED)
+
+
 def find_cycle(section: ReturnMap, start: FloatArray) -> Cycle | NoCycle:
     """The cycle that a point (d,) of the section leads to."""
     done = section.follow(start, FIRST_LOOK)
@@ -101,7 +107,7 @@ def find_cycle(section: ReturnMap, start: FloatArray) -> Cycle | NoCycle:
         if float(np.max(np.abs(points[-1]))) <= VANISHED * float(np.max(np.abs(start))):
             return NoCycle("decays to a point")
         if points.shape[0] >= PATIENCE:
-            return NoCycle(f"no repetition within {points.shape[0]} returns")
+            return NoCycle(f"{UNREPEATED} {points.shape[0]} returns")
         returns = _repeats(points, NEAR)
         if returns and points.shape[0] >= SHOOTING:
             shot = shoot(section, points[-1], returns)
