@@ -32,6 +32,7 @@ HALVINGS: Final = 12  # of an interval that may hold a jump
 STAYED: Final = 0.15  # of the change over the interval, that a jump leaves of it
 SAME_RETURN: Final = 0.25  # relative step of the section's point, above which it may be another return
 READINGS: Final = 32  # values from one reading of the mode sequence to the next
+BESIDE_NOTHING: Final = ("limit cycle appears", "limit cycle vanishes")
 SEEN_TWICE: Final = 4.0  # times the accuracy of a change: so near two of a kind are one
 LOSES_STABILITY: Final = 0.9  # of a multiplier: so near to 1 the cycle ends by it, and by no graze
 DOUBLED: Final = 0.01  # relative difference of extremes just beyond a doubling of the period
@@ -192,7 +193,11 @@ def _at_nothing(
     begun = last
     for one, other in pairwise(way.passed):
         if one.cycle.returns != other.cycle.returns:
-            yield _at_others(loop, parameter, begun, [(other.value, other.cycle)], births)
+            change = _at_others(loop, parameter, begun, [(other.value, other.cycle)], births)
+            yield change
+            if change.name.startswith(BESIDE_NOTHING):  # what is beyond the gap ends here, too
+                beyond = _Last(other.value, other.cycle)
+                yield _at_others(loop, parameter, beyond, [(one.value, one.cycle)], births)
         begun = _Last(other.value, other.cycle).after((one.value, one.cycle))
 
 
@@ -210,11 +215,14 @@ def _at_others(
     way, known = [last], list(others)
     beyond: list[Place | None] = [min(known, key=lambda other: distance(other[1], last.cycle))]
 
+    def inside(value: float) -> bool:
+        return min(last.value, limit) < value < max(last.value, limit)
+
     def goes_on(value: float) -> bool:
         found = cycle_near(loop, parameter, value, way[-1].guess(value))
         if not isinstance(found, Cycle) or not found.stable:
-            if not is_undecided(found):
-                beyond.append(None)
+            goes_elsewhere = isinstance(found, Cycle) or is_undecided(found)
+            beyond.append(min(known, key=lambda other: abs(other[0] - value)) if goes_elsewhere else None)
             return False
         off, alike = way[-1].off_trend(value, found), found.returns == last.cycle.returns
         if not alike or any(c.returns == found.returns and distance(found, c) < off for _, c in known):
@@ -232,12 +240,12 @@ def _at_others(
                 bad = value
             continue
         step = 2.0 * (bad - here)
-        if abs(here + step - limit) > width or not goes_on(here + step):
+        if not (inside(here + step) and goes_on(here + step)):
             break
-        while abs(way[-1].value + 2.0 * step - limit) <= width and goes_on(way[-1].value + 2.0 * step):
+        while inside(way[-1].value + 2.0 * step) and goes_on(way[-1].value + 2.0 * step):
             step *= 2.0
         bad = way[-1].value + 2.0 * step
-        if abs(bad - limit) > width:
+        if not inside(bad):
             bad = limit
     end = way[-1]
     if beyond[-1] is None:
@@ -248,8 +256,8 @@ def _at_others(
 
 def _beside_nothing(way: WayToEnd, outer: float) -> Change:
     """The name of an end beyond which the motion finds no cycle."""
-    word = "appears" if outer < way.passed[0].value else "vanishes"
-    return Change(way.end, f"limit cycle {word}, {'from zero amplitude' if way.shrinks else 'with a jump'}")
+    what = BESIDE_NOTHING[0 if outer < way.passed[0].value else 1]
+    return Change(way.end, f"{what}, {'from zero amplitude' if way.shrinks else 'with a jump'}")
 
 
 @dataclass(frozen=True)

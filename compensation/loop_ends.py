@@ -24,8 +24,8 @@ from compensation.loop_starts import start_sizes
 from compensation.loop_tables import Parameter
 from compensation.orbits.periodic_orbits import Cycle
 
-LOCATED: Final = 1e-8  # of the gain, to which what happens to cycles is located
-OF_INTERVAL: Final = 1e-5  # the same, of an interval that is narrow itself
+LOCATED: Final = 3e-8  # of the gain, to which what happens to cycles is located
+OF_INTERVAL: Final = 1e-4  # the same, of an interval that is narrow itself
 RESOLVED: Final = 4e-16  # relative difference of numbers that can just be told apart
 NOTHING: Final = 1e-30  # of an interval: so near to zero an end is there
 BESIDE: Final = 1e-9  # of a suspect: so near to it a branch that it ends still lives
@@ -87,12 +87,14 @@ def towards_the_end(
     passed = [CycleAt(inside, cycle)]
 
     def goes_on(value: float) -> bool:
+        if value in (passed[-1].value, outside):
+            return value != outside
         found = _leads_to(loop, parameter, value, passed[-1].cycle)
         if found is not None:
             passed.append(CycleAt(value, found))
         return found is not None
 
-    within = [suspect for suspect in suspects if min(interval) < suspect < max(interval)]
+    within = [s for s in suspects if min(interval) <= s <= max(interval) and s != inside]
     for suspect in sorted(within, key=lambda value: abs(value - inside)):
         before, beyond = (_beside(suspect, side) for side in interval)
         if not goes_on(before):

@@ -15,6 +15,7 @@ always 1, along the cycle, is not among them. The cycle is stable where all lie 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -172,7 +173,7 @@ def cycle_of(
         duration, slope = 2.0 * duration, slope @ slope
         high = max(high, -low)
         low = -high
-    multipliers = sorted((complex(value) for value in np.linalg.eigvals(slope)), key=abs, reverse=True)
+    multipliers = sorted(_eigenvalues(slope), key=abs, reverse=True)
     return Cycle(
         point=point,
         returns=returns,
@@ -182,6 +183,19 @@ def cycle_of(
         multipliers=tuple(multipliers),
         stable=abs(multipliers[0]) < 1.0,
     )
+
+
+def _eigenvalues(slope: FloatArray) -> list[complex]:
+    """Of a derivative (d, d); of two rows in closed form, the smaller by the product of both."""
+    if slope.shape != (2, 2):
+        return [complex(value) for value in np.linalg.eigvals(slope)]
+    (a, b), (c, d) = slope.tolist()
+    middle, half = 0.5 * (a + d), 0.5 * (a - d)
+    square = half * half + b * c
+    if square < 0.0:
+        return [complex(middle, side * math.sqrt(-square)) for side in (1.0, -1.0)]
+    larger = middle + math.copysign(math.sqrt(square), middle)
+    return [complex(larger), complex((a * d - b * c) / larger if larger else 0.0)]
 
 
 def _newton_step(slope: FloatArray, missing: FloatArray) -> FloatArray | None:
