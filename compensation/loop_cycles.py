@@ -105,13 +105,12 @@ def mirrored(cycle: Cycle, section: LoopSection) -> Cycle:
 def _swept(loop: ClosedLoop, parameter: Parameter, grid: FloatArray, starts: FloatArray) -> list[list[Cycle]]:
     """Of a symmetric loop: from the cycles of the value before, or else from `starts` (n, 2)."""
     tables = tables_over(loop.robot, loop.controller, parameter, grid)
-    far = np.ascontiguousarray(starts[:, 0])
     found: list[list[Cycle]] = []
     while len(found) < grid.size:
         here = len(found)
         if not (found and found[-1] and found[-1][0].returns > 1):
             first = found[-1][0].point if found and found[-1] else np.array([starts[here, 0], 0.0])
-            found.extend(_decided(grid[here:], tables[here:], first, far[here:]))
+            found.extend(_decided(grid[here:], tables[here:], first, starts[here:]))
             here = len(found)
         if here < grid.size:
             before = found[-1] if found else []
@@ -142,10 +141,12 @@ def _at_one(
     return known
 
 
-def _decided(values: FloatArray, tables: FloatArray, first: FloatArray, far: FloatArray) -> list[list[Cycle]]:
+def _decided(
+    values: FloatArray, tables: FloatArray, first: FloatArray, starts: FloatArray
+) -> list[list[Cycle]]:
     """The cycles at as many of the values (n,) as the kernel decides upon."""
     rows, verdicts = np.empty((values.size, COLUMNS)), np.empty(values.size, np.int64)
-    sweep(map_kernels(tables[0]), values, tables, TOLERANCE, PATIENCE, first, far, rows, verdicts)
+    sweep(map_kernels(tables[0]), values, tables, TOLERANCE, PATIENCE, first, starts, rows, verdicts)
     undecided = np.flatnonzero(verdicts == UNDECIDED)
     done = int(undecided[0]) if undecided.size else verdicts.size
     cycles = iter(_cycles(rows[:done][verdicts[:done] == FOUND]))
