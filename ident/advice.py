@@ -26,7 +26,9 @@ import numpy as np
 from data.recording import FloatArray
 from ident.evidence.gathering import Evidence
 from ident.fit.confidence import quantile
-from ident.fit.friction_fit import DIRECTIONS, SIGN, Direction, FitData, friction_torque, law_of, residuals
+from ident.fit.fit_data import FitData
+from ident.fit.friction_fit import friction_torque, law_of, residuals
+from ident.fit.law_model import SIGN, Direction
 from ident.fit.weighting import Weighted
 from ident.model.friction import steepest_fall_factor
 
@@ -95,18 +97,14 @@ def advise(evidence: Evidence, weighted: Weighted) -> tuple[Advice, ...]:
     known = tuple(_information(weighted, values) for values in laws)
     candidates = [
         candidate
-        for direction in _directions(weighted)
+        for direction in weighted.data.model.directions
         for candidate in _candidates(evidence, weighted, laws, direction)
     ]
     return tuple(
         _advice(weighted, laws, known, candidates, direction, quantity)
-        for direction in _directions(weighted)
+        for direction in weighted.data.model.directions
         for quantity in QUANTITIES
     )
-
-
-def _directions(weighted: Weighted) -> list[Direction]:
-    return [d for d in DIRECTIONS if np.any(weighted.data.run_direction == SIGN[d])]
 
 
 def _advice(
@@ -117,7 +115,8 @@ def _advice(
     direction: Direction,
     quantity: Quantity,
 ) -> Advice:
-    flat = direction in weighted.data.lines or weighted.fit.law(direction)[1] <= 0.0
+    model = weighted.data.model
+    flat = model.law_of(direction) in model.lines or weighted.fit.law(direction)[1] <= 0.0
     if flat and quantity != "static_torque":
         why = (
             "no Stribeck effect is seen in this direction: slower speeds and breakaways would show one, if "
@@ -180,8 +179,8 @@ def _plausible(weighted: Weighted) -> list[Mapping[str, float]]:
     laws: list[Mapping[str, float]] = []
     for shift in PLAUSIBLE:
         values = dict(fit.values)
-        for direction in _directions(weighted):
-            name = f"{direction}_stribeck_velocity"
+        for law in weighted.data.model.laws:
+            name = f"{law}_stribeck_velocity"
             if name not in fit.free:
                 continue
             where = fit.free.index(name)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ident.evidence.gathering import Evidence
-from ident.fit.friction_fit import DIRECTIONS, SIGN, Direction, FitData
+from ident.fit.fit_data import FitData
+from ident.fit.law_model import DIRECTIONS, SIGN, Direction
 
 
 @dataclass(frozen=True)

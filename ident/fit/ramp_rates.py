@@ -69,7 +69,7 @@ class RateTrend:
 class _Fitted:
     """One shape in every direction that has several rates."""
 
-    rise: FloatArray  # (m,) u' or ln(1 + u'/u'_0)
+    rise: FloatArray  # (m,) u' [N m/s] or ln(1 + u'/u'_0) [-]
     squares: float  # sum of squares in standard errors [-]
     coefficients: Mapping[int, FloatArray]  # direction -> F_s, c
     covariance: Mapping[int, FloatArray]  # direction -> (2, 2), for standard errors as given

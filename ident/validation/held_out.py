@@ -21,19 +21,14 @@ from ident.evidence.breakaway import Breakaway
 from ident.evidence.friction_map import SteadyRun
 from ident.evidence.gathering import Evidence
 from ident.fit.confidence import quantile
-from ident.fit.friction_fit import (
-    DIRECTIONS,
-    SIGN,
-    FitData,
-    FrictionFit,
-    fit_friction,
-    friction_torque,
-    law_of,
-)
+from ident.fit.fit_data import FitData
+from ident.fit.friction_fit import FrictionFit, fit_friction, friction_torque, law_of
+from ident.fit.law_model import DIRECTIONS, SIGN
 from ident.fit.residual_tests import ResidualTest, rank_test, runs_test
 from ident.fit.weighting import Weighted
 
 FOLDS = 10
+LEAST_RUNS = 3  # that each direction keeps
 STEP = 1e-6  # of a derivative, in parts
 
 
@@ -104,9 +99,9 @@ def cross_validate(
         out = fold_of == number
         logs = frozenset(item.log for item, gone in zip(items, out, strict=True) if gone)
         kept = _kept(data, ~out, logs, evidence)
-        if not _is_enough(kept, weighted.fit):
+        if not _is_enough(kept):
             continue
-        fit = fit_friction(kept, free_beta=_free_beta(weighted.fit), start=weighted.fit)
+        fit = fit_friction(kept, start=weighted.fit)
         folds.append(Fold(logs, fit))
         points |= _predicted(recordings, data, items, fit, np.flatnonzero(out))
     ordered = tuple(points[number] for number in sorted(points))
@@ -117,10 +112,6 @@ def cross_validate(
 def _items(evidence: Evidence) -> list[SteadyRun | Breakaway]:
     """In the order of the fit's data."""
     return [*evidence.used_runs, *evidence.used_starts]
-
-
-def _free_beta(fit: FrictionFit) -> bool:
-    return any(name.endswith("stribeck_shape") for name in fit.free)
 
 
 def _folds(data: FitData, items: Sequence[SteadyRun | Breakaway]) -> NDArray[np.int64]:
@@ -155,13 +146,16 @@ def _kept(data: FitData, kept: NDArray[np.bool_], logs: frozenset[str], evidence
     )
 
 
-def _is_enough(data: FitData, fit: FrictionFit) -> bool:
-    """Whether every direction keeps more data than it has parameters, and runs among them."""
-    for direction in DIRECTIONS:
-        runs = int(np.count_nonzero(data.run_direction == SIGN[direction]))
-        starts = int(np.count_nonzero(data.start_direction == SIGN[direction]))
-        free = sum(name.startswith(direction) for name in fit.free)
-        if free and (runs < 3 or runs + starts <= free):
+def _is_enough(data: FitData) -> bool:
+    """Whether every law keeps more data than it has parameters, and runs among them in its directions."""
+    for law in data.model.laws:
+        ways = [SIGN[way] for way in data.model.directions if data.model.law_of(way) == law]
+        runs = np.isin(data.run_direction, ways)
+        starts = np.isin(data.start_direction, ways)
+        free = sum(name.startswith(law) for name in data.free)
+        if any(np.count_nonzero(data.run_direction == way) < LEAST_RUNS for way in ways):
+            return False
+        if int(runs.sum()) + int(starts.sum()) <= free:
             return False
     return True
 

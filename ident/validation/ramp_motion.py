@@ -20,7 +20,8 @@ from data.recording import FloatArray, Recording
 from ident.evidence.breakaway import Breakaway
 from ident.evidence.gathering import Evidence
 from ident.evidence.segmentation import grain
-from ident.fit.friction_fit import Direction, FrictionFit
+from ident.fit.friction_fit import FrictionFit
+from ident.fit.law_model import Direction
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
 from ident.response import breakaway_delay, respond
@@ -39,7 +40,7 @@ class RampMotion:
     onset_error: float  # predicted less recorded [s]
     travel: float  # that was compared [rad]
     position_rms: float  # of predicted less recorded, from the ramp's own F_s [rad]
-    counts_rms: float  # the same in encoder counts, or in the grain of an encoder that is not declared
+    counts_rms: float  # the same, in counts or in the grain of an encoder that is not declared [-]
 
 
 def predicted_motions(
@@ -102,12 +103,15 @@ def _along(recording: Recording, start: Breakaway, past: int) -> tuple[FloatArra
 
 
 def _robot(fit: FrictionFit, direction: Direction, *, static: float | None) -> OneLinkRobot | None:
-    """A robot with the law of a direction both ways, and another F_s if one is given."""
+    """A robot with the law of a direction both ways, and another F_s if one is given and it has a Stribeck
+    effect.
+    """
     coulomb, stribeck, velocity, damping, shape = fit.law(direction)
+    static = coulomb + stribeck if static is None else static
+    if fit.model.law_of(direction) in fit.model.lines:
+        static = coulomb
     try:
-        curve = StribeckCurve(
-            coulomb + stribeck if static is None else static, coulomb, velocity, damping, shape
-        )
+        curve = StribeckCurve(static, coulomb, velocity, damping, shape)
         return OneLinkRobot(fit.values["inertia"], StribeckFriction(curve, curve))
     except ModelError:
         return None

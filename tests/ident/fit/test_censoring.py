@@ -11,6 +11,7 @@ from ident.evidence.breakaway import Breakaway
 from ident.evidence.gathering import Evidence
 from ident.fit.assumptions import DEFAULT
 from ident.fit.censoring import least_static_torques
+from ident.fit.law_model import EACH
 from ident.fit.one_stage import explain
 from tests.ident.test_coverage import synthetic_map
 
@@ -31,7 +32,7 @@ def _evidence(*, both: bool) -> Evidence:
 
 def test_where_every_ramp_saturates_the_static_torque_is_a_bound() -> None:
     evidence = _evidence(both=False)
-    assert least_static_torques(evidence) == {"positive": 0.5}
+    assert least_static_torques(evidence, EACH) == {"positive": 0.5}
     values = explain(evidence, axis="rotary", assumptions=DEFAULT).values
     static = values.curves["positive"]["static_torque"]
     assert static.value is None
@@ -44,6 +45,6 @@ def test_where_every_ramp_saturates_the_static_torque_is_a_bound() -> None:
 
 def test_other_breakaways_give_the_number() -> None:
     evidence = _evidence(both=True)
-    assert least_static_torques(evidence) == {}
+    assert least_static_torques(evidence, EACH) == {}
     values = explain(evidence, axis="rotary", assumptions=DEFAULT).values
     assert values.curves["positive"]["static_torque"].value == pytest.approx(0.5735, abs=0.01)

@@ -9,6 +9,7 @@ import pytest
 
 from data.recording import Recording
 from ident.evidence.gathering import Evidence
+from ident.fit.law_model import EACH
 from ident.fit.weighting import settle
 from ident.validation.held_out import FOLDS, CrossValidation, cross_validate
 from tests.ident.test_coverage import synthetic_map
@@ -25,7 +26,7 @@ def _validated(evidence: Evidence) -> CrossValidation:
         )
         for log in logs
     ]
-    return cross_validate(recordings, evidence, settle(evidence, free_beta=False))
+    return cross_validate(recordings, evidence, settle(evidence, EACH))
 
 
 def test_errors_of_prediction_are_of_the_size_that_is_claimed() -> None:

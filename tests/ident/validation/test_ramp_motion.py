@@ -9,6 +9,7 @@ import pytest
 
 from ident.evidence.gathering import gather
 from ident.fit.friction_fit import FrictionFit
+from ident.fit.law_model import EACH
 from ident.validation.held_out import CrossValidation, Fold
 from ident.validation.ramp_motion import RampMotion, predicted_motions
 from tests.ident.rigs import Rig
@@ -18,7 +19,7 @@ LOG = RIG.ramps([0.1, -0.2], np.random.default_rng(1))
 
 
 def _true_fit() -> FrictionFit:
-    values = {"inertia": RIG.robot.inertia}
+    values = {"inertia": RIG.robot.inertia, "torque_offset": 0.0}
     for direction in ("positive", "negative"):
         curve = getattr(RIG.robot.friction, direction)
         values |= {
@@ -28,7 +29,7 @@ def _true_fit() -> FrictionFit:
             f"{direction}_viscous_damping": curve.viscous_damping,
             f"{direction}_stribeck_shape": 1.0,
         }
-    return FrictionFit(values, (), np.zeros((0, 0)), 0.0, "", None)
+    return FrictionFit(EACH, values, (), np.zeros((0, 0)), 0.0, None)
 
 
 def _motions(fit: FrictionFit) -> tuple[RampMotion, ...]:
