@@ -28,8 +28,10 @@ from ident.evidence.gathering import (
 from ident.evidence.ripple_correction import ripple_findings
 from ident.fit.assumptions import DEFAULT, Assumptions
 from ident.fit.breakaway_summary import BreakawaySummary, breakaway_summaries
+from ident.fit.circumstances import circumstances
 from ident.fit.law_model import DIRECTIONS, SIGN
 from ident.fit.one_stage import explain
+from ident.fit.residual_findings import residual_findings
 from ident.fit.weighting import Weighted
 from ident.validation.summary import Validation, validate
 
@@ -67,6 +69,12 @@ def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFA
         *ripple_findings(evidence.waves, axis),
         *_missing_tests(evidence),
         *explained.findings,
+        *residual_findings(
+            explained.evidence,
+            explained.weighted,
+            circumstances(recordings, explained.evidence),
+            axis,
+        ),
     ]
     robot = IdentifiedRobot(
         inertia=values.inertia,
