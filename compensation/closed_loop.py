@@ -88,7 +88,8 @@ def simulate(
         wanted = checked_times(times, duration)
     states = np.empty((wanted.size, 3))
     end, marks = _run(loop, state, wanted, states, duration, tolerance)
-    states[end.outputs :] = np.nan
+    if end.outputs < wanted.size:
+        states[end.outputs :] = np.nan
     return Trajectory(
         time=wanted,
         state=states,

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from data.findings import Finding, Severity
 from data.recording import Axis, Recording
 from ident.estimate import Estimate, IdentifiedRobot
-from ident.evidence.frequency_response import FrequencyInertia
 from ident.evidence.friction_map import MapPoint
 from ident.evidence.gathering import (
     Evidence,
@@ -40,7 +39,8 @@ class Identification:
     robot: IdentifiedRobot
     friction_map: tuple[MapPoint, ...]
     fit_report: str  # lmfit's own
-    response: FrequencyInertia | None  # for figures, whether the fit used it or not
+    evidence: Evidence  # used or not
+    weighted: Weighted
 
 
 def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFAULT) -> Identification:
@@ -82,7 +82,8 @@ def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFA
         simulated=any(recording.simulated for recording in recordings),
     )
     weighted = explained.weighted
-    return Identification(robot, friction_map(evidence, weighted), weighted.fit.report, evidence.response)
+    points = friction_map(evidence, weighted)
+    return Identification(robot, points, weighted.fit.report, evidence, weighted)
 
 
 def friction_map(evidence: Evidence, weighted: Weighted) -> tuple[MapPoint, ...]:

@@ -34,7 +34,6 @@ FORMATS: Final[tuple[Format, ...]] = get_args(Format)
 HEADER: Final = ("t", "x1", "x2", "x3", "v", "u")
 OUTPUT_STEP: Final = 1e-3  # [s] between the rows of a continuous run
 MOST_ROWS: Final = 200_000  # of a continuous run
-DECAYED: Final = 1e-150  # of the start: what has become as small is 0 in every sense
 MOST_TURNS: Final = 1e4  # that a continuous run may take before its gains are to blame
 MOST_SAMPLES: Final = 5_000_000  # of a sampled run
 _START_WORDS: Final = 3
@@ -123,15 +122,6 @@ def _continuous(
     loop = ClosedLoop(robot, controller)
     found = simulate(loop, start, times=np.linspace(0.0, duration, rows), duration=duration)
     missing = ~np.isfinite(found.state).all(axis=1)
-    if missing.any() and np.max(np.abs(found.end_state)) <= DECAYED * max(map(abs, start)):
-        found.state[missing] = 0.0
-        return SimulatedRun(
-            time=found.time,
-            state=found.state,
-            torque=torque(loop, found.state),
-            loop="continuous: inclusion (8)",
-            end=f"decayed to the set point, below the smallest numbers, after {found.end_time:.4g} s",
-        )
     if missing.any():
         raise RefusalError(
             f"the run stopped at t = {found.end_time:.6g} s of {duration:g} s ({found.end_reason}): nothing "
