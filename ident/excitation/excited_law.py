@@ -1,0 +1,188 @@
+"""From excitation logs to a law: the steps in order.
+
+1. Logs are cut into spans without gaps; the band, the timing and the terms are chosen from the data.
+2. Inverse dynamics gives the linear law, with robust errors. Half the band gives it again: what an estimate
+   moves by then is part of its error, since the law is never exact and the band a choice.
+3. Where a reference is logged, instruments tell whether noise in the loop bends the estimate.
+4. Output error adds the Stribeck effect, where one is seen; then the whole law is its.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from data.recording import Axis, FloatArray, Recording
+from ident.excitation.band import cutoff_frequency
+from ident.excitation.cross_validation import held_out_error
+from ident.excitation.filtering import Equation, equation
+from ident.excitation.instruments import Comparison, compare_instruments
+from ident.excitation.inverse_dynamics import (
+    GRAVITY,
+    FrictionTerms,
+    Law,
+    LinearFit,
+    least_squares,
+    system,
+)
+from ident.excitation.output_error import OutputError, Windows, refine, windows
+from ident.excitation.spans import Span, spans
+from ident.excitation.timing import ActingTime, acting_time
+
+SAME_PERIOD: Final = 0.01  # relative: spans that are fitted together
+TURNED: Final = 1.5  # [rad] travel above which gravity can be told from an offset
+FELT: Final = 4.0  # standard errors of a gravity that is there
+
+
+@dataclass(frozen=True)
+class ExcitedLaw:
+    """The law behind a motion, and how it was found."""
+
+    law: Law
+    values: Mapping[str, float]  # by the names of `ident.excitation.inverse_dynamics`
+    names: tuple[str, ...]  # of the covariance
+    covariance: FloatArray  # (p, p)
+    dof: int
+    terms: FrictionTerms
+    cutoff: float  # [Hz]
+    timing: ActingTime
+    linear: LinearFit
+    comparison: Comparison | None
+    refined: OutputError | None  # the linear law
+    whole: OutputError | None  # with a Stribeck effect, where one is seen
+    window: float | None  # [s] over which the refinement predicts
+    motion: float  # root mean square of the position over such a window, about its mean [rad]
+    held_out: float | None  # relative error of the torque on folds left out [-]
+    left_out: float  # part of the logs in which the link may stick or the torque saturates [-]
+    used: frozenset[str]  # logs
+    unused: Mapping[str, str]  # log -> why
+
+    def stderr(self, name: str) -> float:
+        """Standard error of a parameter."""
+        k = self.names.index(name)
+        return float(np.sqrt(self.covariance[k, k]))
+
+
+def excited_law(recordings: Sequence[Recording], *, law: Law, axis: Axis) -> ExcitedLaw | str:
+    """The law behind the motions of one rig; a sentence where none can be had."""
+    pieces, unused = _alike(recordings)
+    if not pieces:
+        return "no log has an unbroken stretch of 64 samples"
+    terms = FrictionTerms(law)
+    cutoff = cutoff_frequency(pieces, terms=terms, timing="measured")
+    if axis == "rotary" and max(np.ptp(piece.position) for piece in pieces) > TURNED:
+        terms = _with_gravity(pieces, terms, cutoff=cutoff)
+    timing = acting_time(pieces, cutoff=cutoff, terms=terms)
+    equations = equations_of(pieces, cutoff=cutoff, timing=timing)
+    problem = system(equations, terms) if equations else None
+    linear = least_squares(problem) if problem is not None else None
+    if problem is None or linear is None:
+        return _why_singular(pieces, equations)
+    comparison = compare_instruments(equations, problem, linear, terms, timing=timing.timing)
+    chosen = comparison.fit if comparison is not None and comparison.bent else linear
+    refined, whole, data = _refined(equations, chosen, law, timing)
+    used = frozenset(one.span.log for one in equations)
+    short = {piece.log: "too short for the filter" for piece in pieces if piece.log not in used}
+    common = {
+        "law": law, "terms": terms, "cutoff": cutoff, "timing": timing, "linear": chosen,
+        "comparison": comparison, "refined": refined, "whole": whole,
+        "window": None if data is None else data.duration,
+        "motion": 0.0 if data is None else float(np.sqrt(np.mean(np.var(data.position, axis=1)))),
+        "held_out": held_out_error(problem),
+        "left_out": float(np.mean([one.left_out for one in equations])),
+        "used": used, "unused": {**unused, **short},
+    }  # fmt: skip
+    if whole is not None:
+        return ExcitedLaw(
+            values=whole.values, names=whole.names, covariance=whole.covariance, dof=whole.dof, **common
+        )
+    covariance = _with_band(chosen, pieces, terms, cutoff=0.5 * cutoff, timing=timing)
+    values = dict(zip(chosen.names, chosen.values.tolist(), strict=True))
+    return ExcitedLaw(values=values, names=chosen.names, covariance=covariance, dof=chosen.dof, **common)
+
+
+def equations_of(pieces: Sequence[Span], *, cutoff: float, timing: ActingTime) -> list[Equation]:
+    """The equation of motion of each span that is long enough."""
+    made = (equation(p, cutoff=cutoff, timing=timing.timing, delay=timing.delay) for p in pieces)
+    return [one for one in made if one is not None]
+
+
+def _alike(recordings: Sequence[Recording]) -> tuple[list[Span], dict[str, str]]:
+    """Spans of the commonest sample period, and why other logs are not used."""
+    pieces = [piece for recording in recordings for piece in spans(recording)]
+    unused = {
+        recording.log: "no unbroken stretch of 64 samples"
+        for recording in recordings
+        if not any(piece.log == recording.log for piece in pieces)
+    }
+    if not pieces:
+        return [], unused
+    periods = np.array([piece.period for piece in pieces])
+    near = np.abs(periods[:, None] - periods) < SAME_PERIOD * periods
+    common = periods[int(np.argmax(near @ np.array([piece.duration for piece in pieces])))]
+    kept = [piece for piece in pieces if abs(piece.period - common) < SAME_PERIOD * common]
+    for piece in pieces:
+        if not any(other.log == piece.log for other in kept):
+            unused[piece.log] = (
+                f"sampled every {piece.period:.3g} s, the other logs every {common:.3g} s: identify it alone"
+            )
+    return kept, unused
+
+
+def _with_gravity(pieces: Sequence[Span], terms: FrictionTerms, *, cutoff: float) -> FrictionTerms:
+    """The terms, with gravity where it is felt."""
+    heavy = replace(terms, gravity=True)
+    timing = acting_time(pieces, cutoff=cutoff, terms=terms)
+    equations = equations_of(pieces, cutoff=cutoff, timing=timing)
+    fit = least_squares(system(equations, heavy)) if equations else None
+    if fit is None:
+        return terms
+    felt = any(abs(fit.value(name)) > FELT * fit.stderr(name) for name in GRAVITY)
+    return heavy if felt else terms
+
+
+def _with_band(
+    fit: LinearFit, pieces: Sequence[Span], terms: FrictionTerms, *, cutoff: float, timing: ActingTime
+) -> FloatArray:
+    """The covariance (p, p), widened by what half the band moves each parameter by."""
+    equations = equations_of(pieces, cutoff=cutoff, timing=timing)
+    other = least_squares(system(equations, terms)) if equations else None
+    if other is None:
+        return fit.covariance
+    variance = np.diag(fit.covariance)
+    moved = (other.values - fit.values) ** 2
+    wider = np.sqrt(1.0 + moved / np.where(variance > 0, variance, np.inf))
+    return np.asarray(fit.covariance * np.outer(wider, wider))
+
+
+def _refined(
+    equations: Sequence[Equation], begun: LinearFit, law: Law, timing: ActingTime
+) -> tuple[OutputError | None, OutputError | None, Windows | None]:
+    data = windows(equations, timing=timing.timing, delay=timing.delay)
+    if data is None:
+        return None, None, None
+    fastest = float(max(np.max(np.abs(one.motion.rate)) for one in equations))
+    linear, whole = refine(data, begun, law, fastest=fastest)
+    return linear, whole, data
+
+
+def _why_singular(pieces: Sequence[Span], equations: Sequence[Equation]) -> str:
+    if not equations:
+        return (
+            "nothing is left of the logs once the filter's ends, rest and saturation are cut off: record a "
+            "longer motion, or a faster one"
+        )
+    directions = np.unique(np.concatenate([one.motion.direction[one.weight > 0] for one in equations]))
+    if directions.size < 2:
+        way = "positive" if directions[0] > 0 else "negative"
+        return (
+            f"E-DIRECTION: the link moves with {way} velocity only: F_c cannot be told from an offset, nor "
+            "the other direction at all. Record a motion that goes both ways"
+        )
+    return (
+        f"the motion of {pieces[0].log} does not tell its terms apart (one speed, or no acceleration): "
+        "record speeds and accelerations that change"
+    )
