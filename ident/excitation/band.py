@@ -17,7 +17,7 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from scipy.signal import welch
+from scipy.signal import detrend, welch
 
 from data.recording import FloatArray
 from ident.excitation.direction import position_noise
@@ -92,7 +92,13 @@ def _explained(
     frequency, torque_power = spectrum(given, h)
     _, power = spectrum(left, h)
     reached = edges[edges <= max(sharp, edges[1])]
-    return min(_clear_of_noise(span, edges), highest_band(frequency, EXPLAINED * torque_power, power, reached))
+    return min(
+        _clear_of_noise(span, edges), highest_band(frequency, EXPLAINED * torque_power, power, reached)
+    )
+
+
+def _without_line(stretch: FloatArray) -> FloatArray:
+    return np.asarray(detrend(stretch, type="linear"))
 
 
 def highest_band(frequency: FloatArray, power: FloatArray, needed: FloatArray, edges: FloatArray) -> float:
@@ -110,5 +116,5 @@ def spectrum(signal: FloatArray, period: float) -> tuple[FloatArray, FloatArray]
     """One-sided power spectrum of a signal (n,): frequency [Hz], density."""
     length = max(64, int(signal.size / SEGMENTS))
     length = min(length, signal.size)
-    frequency, power = welch(signal, 1.0 / period, nperseg=length, detrend="linear")
+    frequency, power = welch(signal, 1.0 / period, nperseg=length, detrend=_without_line)
     return np.asarray(frequency), np.asarray(power)

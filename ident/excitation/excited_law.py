@@ -18,7 +18,7 @@ import numpy as np
 from data.recording import Axis, FloatArray, Recording
 from ident.excitation.band import cutoff_frequency
 from ident.excitation.cross_validation import held_out_error
-from ident.excitation.filtering import Equation, equation
+from ident.excitation.filtering import Equation, Timing, equation
 from ident.excitation.instruments import Comparison, compare_instruments
 from ident.excitation.inverse_dynamics import (
     GRAVITY,
@@ -28,7 +28,7 @@ from ident.excitation.inverse_dynamics import (
     least_squares,
     system,
 )
-from ident.excitation.output_error import OutputError, Windows, refine, windows
+from ident.excitation.output_error import OutputError, polish, refine, windows
 from ident.excitation.spans import Span, spans
 from ident.excitation.timing import ActingTime, acting_time
 
@@ -51,14 +51,14 @@ class ExcitedLaw:
     timing: ActingTime
     linear: LinearFit
     comparison: Comparison | None
-    refined: OutputError | None  # the linear law
-    whole: OutputError | None  # with a Stribeck effect, where one is seen
-    window: float | None  # [s] over which the refinement predicts
-    motion: float  # root mean square of the position over such a window, about its mean [rad]
     held_out: float | None  # relative error of the torque on folds left out [-]
     left_out: float  # part of the logs in which the link may stick or the torque saturates [-]
     used: frozenset[str]  # logs
     unused: Mapping[str, str]  # log -> why
+    refined: OutputError | None = None  # the linear law by output error; None: too few windows
+    whole: OutputError | None = None  # with a Stribeck effect, where one is seen
+    window: float | None = None  # [s] over which the refinement predicts
+    motion: float = 0.0  # root mean square of the position over such a window, about its mean [rad]
 
     def stderr(self, name: str) -> float:
         """Standard error of a parameter."""
@@ -83,25 +83,25 @@ def excited_law(recordings: Sequence[Recording], *, law: Law, axis: Axis) -> Exc
         return _why_singular(pieces, equations)
     comparison = compare_instruments(equations, problem, linear, terms, timing=timing.timing)
     chosen = comparison.fit if comparison is not None and comparison.bent else linear
-    refined, whole, data = _refined(equations, chosen, law, timing)
     used = frozenset(one.span.log for one in equations)
     short = {piece.log: "too short for the filter" for piece in pieces if piece.log not in used}
-    common = {
-        "law": law, "terms": terms, "cutoff": cutoff, "timing": timing, "linear": chosen,
-        "comparison": comparison, "refined": refined, "whole": whole,
-        "window": None if data is None else data.duration,
-        "motion": 0.0 if data is None else float(np.sqrt(np.mean(np.var(data.position, axis=1)))),
-        "held_out": held_out_error(problem),
-        "left_out": float(np.mean([one.left_out for one in equations])),
-        "used": used, "unused": {**unused, **short},
-    }  # fmt: skip
-    if whole is not None:
-        return ExcitedLaw(
-            values=whole.values, names=whole.names, covariance=whole.covariance, dof=whole.dof, **common
-        )
-    covariance = _with_band(chosen, pieces, terms, cutoff=0.5 * cutoff, timing=timing)
-    values = dict(zip(chosen.names, chosen.values.tolist(), strict=True))
-    return ExcitedLaw(values=values, names=chosen.names, covariance=covariance, dof=chosen.dof, **common)
+    found = ExcitedLaw(
+        law=law,
+        values=dict(zip(chosen.names, chosen.values.tolist(), strict=True)),
+        names=chosen.names,
+        covariance=_with_band(chosen, pieces, terms, cutoff=0.5 * cutoff, timing=timing),
+        dof=chosen.dof,
+        terms=terms,
+        cutoff=cutoff,
+        timing=timing,
+        linear=chosen,
+        comparison=comparison,
+        held_out=held_out_error(problem),
+        left_out=float(np.mean([one.left_out for one in equations])),
+        used=used,
+        unused={**unused, **short},
+    )
+    return _refined(found, equations)
 
 
 def equations_of(pieces: Sequence[Span], *, cutoff: float, timing: ActingTime) -> list[Equation]:
@@ -158,15 +158,33 @@ def _with_band(
     return np.asarray(fit.covariance * np.outer(wider, wider))
 
 
-def _refined(
-    equations: Sequence[Equation], begun: LinearFit, law: Law, timing: ActingTime
-) -> tuple[OutputError | None, OutputError | None, Windows | None]:
+def _refined(found: ExcitedLaw, equations: Sequence[Equation]) -> ExcitedLaw:
+    """With the output error, whose whole law stands where a Stribeck effect is seen."""
+    timing = found.timing
     data = windows(equations, timing=timing.timing, delay=timing.delay)
     if data is None:
-        return None, None, None
+        return found
     fastest = float(max(np.max(np.abs(one.motion.rate)) for one in equations))
-    linear, whole = refine(data, begun, law, fastest=fastest)
-    return linear, whole, data
+    refined, whole = refine(data, found.linear, found.law, fastest=fastest)
+    motion = float(np.sqrt(np.mean(np.var(data.position, axis=1))))
+    found = replace(found, refined=refined, window=data.duration, motion=motion)
+    if whole is None:
+        return found
+    if not timing.delay:  # a Stribeck effect bends the timing that the linear law sees
+        opposite: Timing = "held" if timing.timing == "measured" else "measured"
+        other = windows(equations, timing=opposite, delay=0.0)
+        again = None if other is None else polish(other, whole, found.law)
+        if again is not None and again.error < whole.error:
+            whole, timing = again, replace(timing, timing=opposite)
+    return replace(
+        found,
+        whole=whole,
+        timing=timing,
+        values=whole.values,
+        names=whole.names,
+        covariance=whole.covariance,
+        dof=whole.dof,
+    )
 
 
 def _why_singular(pieces: Sequence[Span], equations: Sequence[Equation]) -> str:

@@ -82,7 +82,9 @@ class Equation:
 def low_pass(signal: FloatArray, cutoff: float, period: float) -> FloatArray:
     """Zero-phase Butterworth of a signal (n,)."""
     sections = butter(ORDER, 2.0 * cutoff * period, output="sos")
-    return np.asarray(sosfiltfilt(sections, signal, padlen=min(signal.size - 1, round(3 / (cutoff * period)))))
+    return np.asarray(
+        sosfiltfilt(sections, signal, padlen=min(signal.size - 1, round(3 / (cutoff * period))))
+    )
 
 
 def sharp_cutoff(cutoff: float, period: float) -> float:
@@ -131,7 +133,7 @@ def acting(torque: FloatArray, period: float, *, timing: Timing, delay: float) -
     later = np.asarray(np.interp(samples - delay / period, samples, torque)) if delay else torque
     if timing == "measured":
         return later
-    return 0.5 * (later + np.concatenate([later[:1], later[:-1]]))
+    return np.asarray(0.5 * (later + np.concatenate([later[:1], later[:-1]])))
 
 
 def difference(signal: FloatArray, period: float) -> FloatArray:

@@ -63,7 +63,9 @@ class FrictionTerms:
         if self.law == "one":
             terms = [motion.rate, direction, np.ones_like(direction)]
         else:
-            terms = [term * way for term in (motion.rate, direction) for way in (direction > 0, direction < 0)]
+            terms = [
+                term * way for term in (motion.rate, direction) for way in (direction > 0, direction < 0)
+            ]
         return [*terms, np.sin(motion.position), np.cos(motion.position)] if self.gravity else terms
 
 
@@ -105,8 +107,7 @@ class LinearFit:
 def system(equations: Sequence[Equation], terms: FrictionTerms) -> System:
     """Every span's equation with the given friction."""
     blocks = [
-        np.column_stack([one.acceleration, *map(one.filtered, terms.of(one.motion))])
-        for one in equations
+        np.column_stack([one.acceleration, *map(one.filtered, terms.of(one.motion))]) for one in equations
     ]
     return System(
         terms.names,
@@ -145,4 +146,3 @@ def least_squares(problem: System, *, instruments: FloatArray | None = None) -> 
         residual,
         float(np.linalg.norm(residual) / np.linalg.norm(problem.torque)),
     )
-

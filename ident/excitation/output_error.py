@@ -20,6 +20,7 @@ from typing import Final
 
 import lmfit
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import lstsq
 
 from data.recording import FloatArray
@@ -47,19 +48,19 @@ class Windows:
     start: FloatArray  # (w, 2) position [rad] and speed [rad/s]
     torque: FloatArray  # (w, k) held from sample to sample [N m]
     position: FloatArray  # (w, c) measured [rad]
-    compared: FloatArray  # (c,) sample numbers
+    compared: NDArray[np.int64]  # (c,) sample numbers
     period: float  # [s]
     nudge: float  # [rad/s] change of the initial speed that gives dq/dv_0
 
     @property
     def duration(self) -> float:
         """[s]."""
-        return self.torque.shape[1] * self.period
+        return float(self.torque.shape[1] * self.period)
 
 
 @dataclass(frozen=True)
 class OutputError:
-    """The refined law. Names as in `ident.excitation.inverse_dynamics`, with stribeck_torque, dF, and _velocity."""
+    """The refined law: names as of the inverse dynamics, with stribeck_torque (dF) and stribeck_velocity."""
 
     values: Mapping[str, float]
     names: tuple[str, ...]  # free parameters
@@ -95,7 +96,7 @@ def windows(equations: Sequence[Equation], *, timing: Timing, delay: float) -> W
         start=np.array([(one.span.position[k], one.motion.rate[k]) for one, k in begins]),
         torque=np.array([torques[id(one)][k : k + size] for one, k in begins]),
         position=np.array([one.span.position[k + compared] for one, k in begins]),
-        compared=compared.astype(np.float64),
+        compared=compared.astype(np.int64),
         period=h,
         nudge=1e-3 * float(np.std(speeds)),
     )
@@ -106,7 +107,7 @@ def _held(torque: FloatArray, period: float, *, timing: Timing, delay: float) ->
     if timing == "held":
         return acting(torque, period, timing="measured", delay=delay)
     later = acting(torque, period, timing="measured", delay=delay)
-    return 0.5 * (later + np.append(later[1:], later[-1]))
+    return np.asarray(0.5 * (later + np.append(later[1:], later[-1])))
 
 
 def plant_of(values: Mapping[str, float], law: Law) -> tuple[FloatArray, float]:
@@ -125,21 +126,22 @@ def plant_of(values: Mapping[str, float], law: Law) -> tuple[FloatArray, float]:
 def residual(data: Windows, values: Mapping[str, float], law: Law) -> FloatArray:
     """Measured less simulated positions (w, c) [rad], the initial conditions projected out."""
     plant, offset = plant_of(values, law)
-    numbers = data.compared.astype(np.int64)
-    plain = _simulated(data.start, data.torque - offset, data.period, plant, numbers)
+    plain = _simulated(data.start, data.torque - offset, data.period, plant, data.compared)
     nudged = data.start + np.array([0.0, data.nudge])
-    slope = (_simulated(nudged, data.torque - offset, data.period, plant, numbers) - plain) / data.nudge
+    slope = (_simulated(nudged, data.torque - offset, data.period, plant, data.compared) - plain) / data.nudge
     left = data.position - plain
     left = left - left.mean(axis=1, keepdims=True)
     slope = slope - slope.mean(axis=1, keepdims=True)
     power = np.sum(slope**2, axis=1, keepdims=True)
-    part = np.divide(np.sum(slope * left, axis=1, keepdims=True), power, out=np.zeros_like(power), where=power > 0)
+    part = np.divide(
+        np.sum(slope * left, axis=1, keepdims=True), power, out=np.zeros_like(power), where=power > 0
+    )
     return np.asarray(left - part * slope)
 
 
 @owning
 def _simulated(
-    start: FloatArray, torque: FloatArray, period: float, plant: FloatArray, compared: FloatArray
+    start: FloatArray, torque: FloatArray, period: float, plant: FloatArray, compared: NDArray[np.int64]
 ) -> FloatArray:
     positions = np.empty((start.shape[0], compared.size))
     for w in range(start.shape[0]):
@@ -154,7 +156,9 @@ def _simulated(
     return positions
 
 
-def refine(data: Windows, begun: LinearFit, law: Law, *, fastest: float) -> tuple[OutputError, OutputError | None]:
+def refine(
+    data: Windows, begun: LinearFit, law: Law, *, fastest: float
+) -> tuple[OutputError, OutputError | None]:
     """The linear law refined, and the law with a Stribeck effect where one is seen.
 
     `fastest` is the largest speed [rad/s] of the motion.
@@ -174,6 +178,14 @@ def refine(data: Windows, begun: LinearFit, law: Law, *, fastest: float) -> tupl
     best = min(trials, key=lambda trial: float(trial.chisqr))
     whole = _fit(data, best.params, law)
     return linear, whole if _is_seen(whole, prefixes) else None
+
+
+def polish(data: Windows, begun: OutputError, law: Law) -> OutputError:
+    """The same law fitted to other windows."""
+    start = lmfit.Parameters()
+    for name, value in begun.values.items():
+        start.add(name, value=value, min=_least(name))
+    return _fit(data, start, law)
 
 
 def _is_seen(whole: OutputError, prefixes: Sequence[str]) -> bool:

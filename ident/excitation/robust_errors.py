@@ -25,7 +25,7 @@ FEWEST = 4  # cosines
 
 def cosines(n: int) -> int:
     """B, the degrees of freedom, for n samples."""
-    return max(FEWEST, round(0.4 * n ** (2.0 / 3.0)))
+    return max(FEWEST, int(np.rint(0.4 * n ** (2.0 / 3.0))))
 
 
 def long_run_covariance(scores: FloatArray) -> FloatArray:

@@ -17,7 +17,6 @@ from typing import Final
 import numpy as np
 
 from data.recording import FloatArray
-
 from ident.excitation.filtering import (
     Equation,
     Timing,

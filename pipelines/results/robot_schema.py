@@ -16,7 +16,8 @@ from pipelines.settings.loop import ObserverUpdate
 SAME_MEAN: Final = 1e-6  # relative
 FREE_PARAMETERS: Final = {
     "inertia",
-    *(f"{direction}.{name}" for direction in ("positive", "negative") for name in CURVE_PARAMETERS),
+    "torque_offset",
+    *(f"{law}.{name}" for law in ("positive", "negative", "mean") for name in CURVE_PARAMETERS),
 }
 Number = Annotated[float, Field(allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0)]
