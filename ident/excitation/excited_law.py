@@ -3,8 +3,10 @@
 1. Logs are cut into spans without gaps; the band, the timing and the terms are chosen from the data.
 2. Inverse dynamics gives the linear law, with robust errors. Half the band gives it again: what an estimate
    moves by then is part of its error, since the law is never exact and the band a choice.
-3. Where a reference is logged, instruments tell whether noise in the loop bends the estimate.
-4. Output error adds the Stribeck effect, where one is seen; then the whole law is its.
+3. Where a reference is logged, instruments tell whether noise in the loop bends the estimate; the error is
+   then widened by the distance.
+4. Output error adds the Stribeck effect, where one is seen; then the whole law is its, and windows of half
+   the length tell what that choice moves.
 """
 
 from __future__ import annotations
@@ -28,13 +30,14 @@ from ident.excitation.inverse_dynamics import (
     least_squares,
     system,
 )
-from ident.excitation.output_error import OutputError, polish, refine, windows
+from ident.excitation.output_error import LENGTH, OutputError, polish, refine, windows
 from ident.excitation.spans import Span, spans
 from ident.excitation.timing import ActingTime, acting_time
 
 SAME_PERIOD: Final = 0.01  # relative: spans that are fitted together
-TURNED: Final = 1.5  # [rad] travel above which gravity can be told from an offset
-FELT: Final = 4.0  # standard errors of a gravity that is there
+TURNED: Final = np.pi  # [rad] travel above which gravity can be told from an offset
+FELT: Final = 5.0  # standard errors of a gravity that is there
+HEAVY: Final = 0.05  # of the torque's root mean square: a lesser gravity is none
 
 
 @dataclass(frozen=True)
@@ -82,19 +85,20 @@ def excited_law(recordings: Sequence[Recording], *, law: Law, axis: Axis) -> Exc
     if problem is None or linear is None:
         return _why_singular(pieces, equations)
     comparison = compare_instruments(equations, problem, linear, terms, timing=timing.timing)
-    chosen = comparison.fit if comparison is not None and comparison.bent else linear
+    others = [_in_half_the_band(pieces, terms, cutoff=cutoff, timing=timing)]
+    others += [comparison.fit] if comparison is not None and comparison.bent else []
     used = frozenset(one.span.log for one in equations)
     short = {piece.log: "too short for the filter" for piece in pieces if piece.log not in used}
     found = ExcitedLaw(
         law=law,
-        values=dict(zip(chosen.names, chosen.values.tolist(), strict=True)),
-        names=chosen.names,
-        covariance=_with_band(chosen, pieces, terms, cutoff=0.5 * cutoff, timing=timing),
-        dof=chosen.dof,
+        values=dict(zip(linear.names, linear.values.tolist(), strict=True)),
+        names=linear.names,
+        covariance=_with_choices(linear, others),
+        dof=linear.dof,
         terms=terms,
         cutoff=cutoff,
         timing=timing,
-        linear=chosen,
+        linear=linear,
         comparison=comparison,
         held_out=held_out_error(problem),
         left_out=float(np.mean([one.left_out for one in equations])),
@@ -141,19 +145,25 @@ def _with_gravity(pieces: Sequence[Span], terms: FrictionTerms, *, cutoff: float
     if fit is None:
         return terms
     felt = any(abs(fit.value(name)) > FELT * fit.stderr(name) for name in GRAVITY)
-    return heavy if felt else terms
+    size = float(np.linalg.norm([fit.value(name) for name in GRAVITY]))
+    torque = np.concatenate([one.torque for one in equations])
+    return heavy if felt and size > HEAVY * float(np.sqrt(np.mean(torque**2))) else terms
 
 
-def _with_band(
-    fit: LinearFit, pieces: Sequence[Span], terms: FrictionTerms, *, cutoff: float, timing: ActingTime
+def _in_half_the_band(
+    pieces: Sequence[Span], terms: FrictionTerms, *, cutoff: float, timing: ActingTime
+) -> LinearFit | None:
+    equations = equations_of(pieces, cutoff=0.5 * cutoff, timing=timing)
+    return least_squares(system(equations, terms)) if equations else None
+
+
+def _with_choices(
+    fit: LinearFit | OutputError, others: Sequence[LinearFit | OutputError | None]
 ) -> FloatArray:
-    """The covariance (p, p), widened by what half the band moves each parameter by."""
-    equations = equations_of(pieces, cutoff=cutoff, timing=timing)
-    other = least_squares(system(equations, terms)) if equations else None
-    if other is None:
-        return fit.covariance
+    """The covariance (p, p), widened by what other choices move each parameter by."""
+    known = [other for other in others if other is not None]
+    moved = np.array([sum((other.value(n) - fit.value(n)) ** 2 for other in known) for n in fit.names])
     variance = np.diag(fit.covariance)
-    moved = (other.values - fit.values) ** 2
     wider = np.sqrt(1.0 + moved / np.where(variance > 0, variance, np.inf))
     return np.asarray(fit.covariance * np.outer(wider, wider))
 
@@ -170,12 +180,17 @@ def _refined(found: ExcitedLaw, equations: Sequence[Equation]) -> ExcitedLaw:
     found = replace(found, refined=refined, window=data.duration, motion=motion)
     if whole is None:
         return found
-    if not timing.delay:  # a Stribeck effect bends the timing that the linear law sees
-        opposite: Timing = "held" if timing.timing == "measured" else "measured"
-        other = windows(equations, timing=opposite, delay=0.0)
+    conventions: tuple[Timing, ...] = ("held", "measured")
+    for convention in conventions:  # a Stribeck effect bends the timing that the linear law sees
+        if convention == timing.timing and not timing.delay:
+            continue
+        other = windows(equations, timing=convention, delay=0.0)
         again = None if other is None else polish(other, whole, found.law)
         if again is not None and again.error < whole.error:
-            whole, timing = again, replace(timing, timing=opposite)
+            whole, timing = again, replace(timing, timing=convention, delay=0.0)
+    half = windows(equations, timing=timing.timing, delay=timing.delay, length=0.5 * LENGTH)
+    halved = None if half is None else polish(half, whole, found.law)
+    whole = replace(whole, covariance=_with_choices(whole, [halved]))
     return replace(
         found,
         whole=whole,

@@ -3,7 +3,8 @@ r"""Whether noise in the loop bends least squares: the reference as an instrumen
 In a closed loop the position's noise and every disturbance come back through the torque, so that the columns
 and the residual know of each other and least squares is biased however long the log. The reference knows of
 neither: its acceleration, speed and direction, filtered alike, are instruments. Both estimates agree within
-the error of their difference unless something is bent; then the instruments' is the consistent one.
+the error of their difference unless something is bent. Which of the two is then nearer to the truth is not
+said: instruments know nothing of noise, but a law that is not exact bends them further than least squares.
 
 Source: Janot, Vandanjon, Gautier, IEEE Trans. Control Systems Technology 22 (2014) 132; the comparison is
 Hausman's, Econometrica 46 (1978) 1251.

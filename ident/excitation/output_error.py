@@ -26,12 +26,12 @@ from scipy.linalg import lstsq
 from data.recording import FloatArray
 from ident.excitation.filtering import Equation, Timing, acting
 from ident.excitation.inverse_dynamics import Law, LinearFit
-from ident.excitation.robust_errors import cosines, long_run_covariance
+from ident.excitation.robust_errors import long_run_covariance
 from ident.response import advance_with_ripple
 from ident.simulation.compiled import owning
 
 LENGTH: Final = 4.0  # of a window, in periods of the cut-off
-MOST: Final = 30_000  # samples simulated in all
+MOST: Final = 20_000  # samples simulated in all
 POINTS: Final = 24  # positions compared in a window
 FEWEST: Final = 12  # windows
 PARTS: Final = ("viscous_damping", "coulomb_torque", "stribeck_torque", "stribeck_velocity")
@@ -69,17 +69,23 @@ class OutputError:
     error: float  # root mean square of position, predicted over a window [rad]
     report: str
 
+    def value(self, name: str) -> float:
+        """A parameter."""
+        return self.values[name]
+
     def stderr(self, name: str) -> float:
         """Robust standard error of a free parameter."""
         k = self.names.index(name)
         return float(np.sqrt(self.covariance[k, k]))
 
 
-def windows(equations: Sequence[Equation], *, timing: Timing, delay: float) -> Windows | None:
+def windows(
+    equations: Sequence[Equation], *, timing: Timing, delay: float, length: float = LENGTH
+) -> Windows | None:
     """Windows over all spans, evenly spread where there are too many; None where there are too few."""
     first = equations[0]
     h = first.span.period
-    size = max(int(LENGTH / (first.cutoff * h)), 8)
+    size = max(int(length / (first.cutoff * h)), 8)
     begins = [
         (one, k)
         for one in equations
@@ -123,20 +129,27 @@ def plant_of(values: Mapping[str, float], law: Law) -> tuple[FloatArray, float]:
     return plant, values.get("torque_offset", 0.0)
 
 
-def residual(data: Windows, values: Mapping[str, float], law: Law) -> FloatArray:
-    """Measured less simulated positions (w, c) [rad], the initial conditions projected out."""
+def starting_slope(data: Windows, values: Mapping[str, float], law: Law) -> FloatArray:
+    """dq/dv_0 at the positions compared (w, c) [s], less its mean over each window, of unit norm or zero."""
     plant, offset = plant_of(values, law)
-    plain = _simulated(data.start, data.torque - offset, data.period, plant, data.compared)
-    nudged = data.start + np.array([0.0, data.nudge])
-    slope = (_simulated(nudged, data.torque - offset, data.period, plant, data.compared) - plain) / data.nudge
-    left = data.position - plain
-    left = left - left.mean(axis=1, keepdims=True)
+    pair = [
+        _simulated(
+            data.start + np.array([0.0, nudge]), data.torque - offset, data.period, plant, data.compared
+        )
+        for nudge in (0.0, data.nudge)
+    ]
+    slope = pair[1] - pair[0]
     slope = slope - slope.mean(axis=1, keepdims=True)
-    power = np.sum(slope**2, axis=1, keepdims=True)
-    part = np.divide(
-        np.sum(slope * left, axis=1, keepdims=True), power, out=np.zeros_like(power), where=power > 0
-    )
-    return np.asarray(left - part * slope)
+    norm = np.linalg.norm(slope, axis=1, keepdims=True)
+    return np.asarray(np.divide(slope, norm, out=np.zeros_like(slope), where=norm > 0))
+
+
+def residual(data: Windows, values: Mapping[str, float], law: Law, slope: FloatArray) -> FloatArray:
+    """Measured less simulated positions (w, c) [rad], the initial conditions projected out along `slope`."""
+    plant, offset = plant_of(values, law)
+    left = data.position - _simulated(data.start, data.torque - offset, data.period, plant, data.compared)
+    left = left - left.mean(axis=1, keepdims=True)
+    return np.asarray(left - np.sum(slope * left, axis=1, keepdims=True) * slope)
 
 
 @owning
@@ -214,10 +227,12 @@ def _parameters(begun: LinearFit) -> lmfit.Parameters:
 def _minimised(
     data: Windows, parameters: lmfit.Parameters, law: Law, *, evaluations: int | None = None
 ) -> lmfit.minimizer.MinimizerResult:
-    scale = float(np.sqrt(np.mean(residual(data, parameters.valuesdict(), law) ** 2))) or 1.0
+    begun = parameters.valuesdict()
+    slope = starting_slope(data, begun, law)
+    scale = float(np.sqrt(np.mean(residual(data, begun, law, slope) ** 2))) or 1.0
 
     def objective(current: lmfit.Parameters) -> FloatArray:
-        return residual(data, current.valuesdict(), law).ravel() / scale
+        return residual(data, current.valuesdict(), law, slope).ravel() / scale
 
     # lmfit's own covariance takes samples for independent; only its report makes use of it.
     with np.errstate(invalid="ignore", over="ignore"):
@@ -230,26 +245,43 @@ def _fit(data: Windows, start: lmfit.Parameters, law: Law) -> OutputError:
     result = _minimised(data, start, law)
     values = {name: float(value) for name, value in result.params.valuesdict().items()}
     names = tuple(result.var_names)
-    left = residual(data, values, law)
-    jacobian = np.stack([_slope(data, values, name, law) for name in names], axis=-1)  # (w, c, p)
+    slope = starting_slope(data, values, law)
+    left = residual(data, values, law, slope)
+    jacobian = np.stack([_derivative(data, values, name, law, slope) for name in names], axis=-1)  # (w, c, p)
     flat = jacobian.reshape(-1, len(names))
     norm = np.linalg.norm(flat, axis=0)
     felt = np.where(norm > 0, norm, 1.0)
     scores = np.einsum("wcp,wc->wp", jacobian / felt, left)
     inverse = lstsq(((flat / felt).T @ (flat / felt)), np.eye(len(names)))[0]
-    covariance = inverse @ long_run_covariance(scores) @ inverse.T / np.outer(felt, felt)
+    covariance = inverse @ _score_covariance(scores) @ inverse.T / np.outer(felt, felt)
     covariance[norm == 0, norm == 0] = np.inf
     return OutputError(
         values,
         names,
         np.asarray(covariance),
-        cosines(left.shape[0]),
+        left.shape[0] - len(names),
         float(np.sqrt(np.mean(left**2))),
         str(lmfit.fit_report(result, show_correl=False)),
     )
 
 
-def _slope(data: Windows, values: Mapping[str, float], name: str, law: Law) -> FloatArray:
+def _score_covariance(scores: FloatArray) -> FloatArray:
+    """Covariance (p, p) of the sum of the windows' scores (w, p).
+
+    Windows are independent but for slow disturbances; where their long-run variance is larger it stands.
+    """
+    number, free = scores.shape
+    own = scores.T @ scores * number / max(number - free, 1)
+    slow = np.diag(long_run_covariance(scores))
+    wider = np.sqrt(np.maximum(1.0, slow / np.where(np.diag(own) > 0, np.diag(own), np.inf)))
+    return np.asarray(own * np.outer(wider, wider))
+
+
+def _derivative(
+    data: Windows, values: Mapping[str, float], name: str, law: Law, slope: FloatArray
+) -> FloatArray:
     step = 1e-4 * (abs(values[name]) or max(abs(value) for value in values.values()))
-    ahead, behind = (residual(data, {**values, name: values[name] + off}, law) for off in (step, -step))
-    return (behind - ahead) / (2.0 * step)
+    ahead, behind = (
+        residual(data, {**values, name: values[name] + off}, law, slope) for off in (step, -step)
+    )
+    return np.asarray((behind - ahead) / (2.0 * step))

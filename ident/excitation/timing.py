@@ -29,7 +29,7 @@ from ident.excitation.inverse_dynamics import FrictionTerms, LinearFit, System, 
 from ident.excitation.spans import Span
 
 CLEAR: Final = 3.0  # standard errors
-BEYOND: Final = 0.1  # of a sample: a smaller delay is not looked for
+BEYOND: Final = 0.5  # of a sample: a smaller delay is not told from what coarse sampling feigns
 
 
 @dataclass(frozen=True)

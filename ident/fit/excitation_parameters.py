@@ -261,7 +261,8 @@ def _bend_findings(found: ExcitedLaw) -> list[Finding]:
     worst = int(np.argmax(np.abs(comparison.distance)))
     text = (
         f"least squares and instruments from the reference differ by {abs(comparison.distance[worst]):.1f} "
-        f"errors of the difference in {comparison.fit.names[worst]}: noise comes back through the loop. The "
-        "instruments' estimate is reported. Use a finer encoder or a larger motion."
+        f"errors of the difference in {comparison.fit.names[worst]}: noise comes back through the loop, or "
+        "the reference is not what the "
+        "link follows. The interval holds both. Use a finer encoder or a larger motion."
     )
     return [Finding("E-SPEEDERR", Severity.WARN, text)]
