@@ -66,7 +66,8 @@ def write_identification(
     folder.write_text("table1.tex", table1_tex(document, truth=truth))
     if advised:
         units = {**UNITS[axis], "critical_observer_gain": "1/s"}
-        write_advice(folder, advise(found.evidence, found.weighted), units)
+        advice = () if found.weighted is None else advise(found.evidence, found.weighted)
+        write_advice(folder, advice, units)
     figure = figure2(found.friction_map, robot.robot(), axis=axis, simulated=robot.simulated)
     folder.write_text("figure2.svg", svg_text(figure))
 

@@ -129,7 +129,7 @@ def run_uses(recordings: Sequence[Recording], evidence: Evidence) -> tuple[RunUs
         if recording.protocol == "set_point":
             why = "a set-point run: the prediction is held against it, nothing is fitted to it"
         elif recording.protocol == "excitation":
-            why = "an excitation run: the friction map does not use it"
+            why = "an excitation run: it is fitted apart from the friction map"
         else:
             nothing = "no start from rest under a ramp was found"
             why = evidence.response_reasons.get(log) or "; ".join(reasons.get(log, [nothing]))
