@@ -12,6 +12,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from data.findings import Finding, Severity
 from data.recording import Axis, Recording
 from ident.estimate import IdentifiedRobot
@@ -26,6 +28,7 @@ from ident.evidence.gathering import (
 )
 from ident.evidence.ripple_correction import ripple_findings
 from ident.fit.assumptions import DEFAULT, Assumptions
+from ident.fit.cross_check import bootstrap_table
 from ident.fit.law_model import DIRECTIONS, SIGN
 from ident.fit.one_stage import explain
 from ident.fit.weighting import Weighted
@@ -37,14 +40,20 @@ class Identification:
 
     robot: IdentifiedRobot
     friction_map: tuple[MapPoint, ...]
-    fit_report: str  # lmfit's own
+    fit_report: str  # lmfit's own, the shapes that were compared, and the bootstrap
     evidence: Evidence  # used or not
     weighted: Weighted
 
 
-def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFAULT) -> Identification:
+def identify(
+    recordings: Sequence[Recording],
+    *,
+    assumptions: Assumptions = DEFAULT,
+    generator: np.random.Generator | None = None,
+) -> Identification:
     """Fit the friction law of each direction and the inertia to the recordings of one rig.
 
+    With a generator, the report holds the intervals of a bootstrap over runs beside those of the profiles.
     A direction without usable steady runs is withheld. Raises `IdentificationError` where no law can be had:
     no usable run in either direction (E-DIRECTION), a torque of the wrong sign (E-SIGN), too few data
     (E-FEW).
@@ -79,7 +88,10 @@ def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFA
     )
     weighted = explained.weighted
     points = friction_map(explained.evidence, weighted)
-    return Identification(robot, points, explained.report, explained.evidence, weighted)
+    report = explained.report
+    if generator is not None:
+        report = f"{report}\n\n{bootstrap_table(weighted.data, values, generator)}"
+    return Identification(robot, points, report, explained.evidence, weighted)
 
 
 def friction_map(evidence: Evidence, weighted: Weighted) -> tuple[MapPoint, ...]:
