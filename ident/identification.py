@@ -32,6 +32,7 @@ from ident.excitation.excited_law import ExcitedLaw, excited_law
 from ident.excitation.inverse_dynamics import Law
 from ident.excitation.report import report
 from ident.fit.assumptions import DEFAULT, Assumptions
+from ident.fit.cross_check import bootstrap_table
 from ident.fit.excitation_parameters import (
     compare_inertia,
     excitation_parameters,
@@ -49,14 +50,20 @@ class Identification:
 
     robot: IdentifiedRobot
     friction_map: tuple[MapPoint, ...]
-    fit_report: str  # lmfit's own, and how an excitation was taken apart
+    fit_report: str  # lmfit's own, the shapes that were compared, the bootstrap, the excitation
     evidence: Evidence  # used or not
     weighted: Weighted | None  # None where the law rests on excitation alone
 
 
-def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFAULT) -> Identification:
+def identify(
+    recordings: Sequence[Recording],
+    *,
+    assumptions: Assumptions = DEFAULT,
+    generator: np.random.Generator | None = None,
+) -> Identification:
     """Fit the friction law and the inertia to the recordings of one rig.
 
+    With a generator, the report holds the intervals of a bootstrap over runs beside those of the profiles.
     A direction without usable steady runs is withheld. Raises `IdentificationError` where no law can be had:
     no usable run in either direction (E-DIRECTION), a torque of the wrong sign (E-SIGN), too few data
     (E-FEW).
@@ -71,12 +78,16 @@ def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFA
     excited = excited_law(excitations, law=law, axis=axis) if excitations else "no excitation log"
     if alone:
         return _from_excitation(recordings, evidence, excited)
-    found = _from_evidence(recordings, evidence, assumptions=assumptions)
+    found = _from_evidence(recordings, evidence, assumptions=assumptions, generator=generator)
     return _with_excitation(found, excited) if excitations else found
 
 
 def _from_evidence(
-    recordings: Sequence[Recording], evidence: Evidence, *, assumptions: Assumptions
+    recordings: Sequence[Recording],
+    evidence: Evidence,
+    *,
+    assumptions: Assumptions,
+    generator: np.random.Generator | None,
 ) -> Identification:
     """The law from constant speeds, breakaways and frequency responses."""
     axis = recordings[0].axis
@@ -106,7 +117,10 @@ def _from_evidence(
     )
     weighted = explained.weighted
     points = friction_map(explained.evidence, weighted)
-    return Identification(robot, points, explained.report, explained.evidence, weighted)
+    fit_report = explained.report
+    if generator is not None:
+        fit_report = f"{fit_report}\n\n{bootstrap_table(weighted.data, values, generator)}"
+    return Identification(robot, points, fit_report, explained.evidence, weighted)
 
 
 def _from_excitation(

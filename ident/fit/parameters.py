@@ -69,7 +69,7 @@ def parameters(
     missing: Mapping[Direction, str] | None = None,
 ) -> Parameters:
     """Values, errors and intervals in the law's own parameters; `missing`: why a direction has no law."""
-    fit, found = profiles(data, fit, _combinations(fit), dof=dof)
+    fit, found = profiles(data, fit, combinations(fit), dof=dof)
     names, matrix, stderr = _physical_covariance(fit)
     units = UNITS[axis]
     findings: list[Finding] = []
@@ -97,13 +97,13 @@ def parameters(
     )
 
 
-def _combinations(fit: FrictionFit) -> dict[str, Combination]:
+def combinations(fit: FrictionFit) -> dict[str, Combination]:
     """Every parameter that has a finite error, and the means of two directions, as the fit has them."""
     felt = {name for name, gone in zip(fit.free, np.isinf(np.diag(fit.covariance)), strict=True) if not gone}
     wanted: dict[str, Combination] = {name: {name: 1.0} for name in COMMON}
     own = {law: law_combinations(law) for law in fit.model.laws}
-    for law, combinations in own.items():
-        wanted |= {f"{law}.{name}": combination for name, combination in combinations.items()}
+    for law, parts in own.items():
+        wanted |= {f"{law}.{name}": combination for name, combination in parts.items()}
     if set(own) == set(DIRECTIONS):
         for name in CURVE_PARAMETERS:
             both = {**own["positive"][name], **own["negative"][name]}
