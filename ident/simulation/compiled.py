@@ -221,9 +221,8 @@ def _source(item: Any) -> Callable[..., object] | None:
     kernel = item.kernel if isinstance(item, _Passed) else item
     if isinstance(kernel, Dispatcher):
         return cast("Callable[..., object]", kernel.py_func)
-    return cast(
-        "Callable[..., object] | None", getattr(item, "_defn", None)
-    )  # where numba's intrinsics keep it
+    made_by = getattr(item, "_defn", None)  # where numba's intrinsics keep it
+    return cast("Callable[..., object] | None", made_by)
 
 
 def _flat(value: Any) -> Iterator[Any]:
