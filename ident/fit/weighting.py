@@ -19,6 +19,7 @@ from ident.evidence.momentum import Momentum
 from ident.fit.fit_data import FitData
 from ident.fit.friction_fit import FrictionFit, fit_friction, friction_torque, start_inertia
 from ident.fit.law_model import SIGN, Direction, LawModel
+from ident.fit.ramp_rates import RateTrend, rate_trend
 from ident.fit.variance_model import RunSpread, run_spread, white_variance
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
@@ -186,13 +187,19 @@ def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: RunS
     start_torque, delay_error = _onset_torque(starts, fit)
     line = np.array([np.hypot(start.line.stderr, start.place_stderr) for start in starts])
     line = np.hypot(line, delay_error)
-    place = _place_spread(data, fit, start_torque, line, spread)
+    trend = _rate_trend(starts, data, fit, start_torque, line, spread)
+    place = _place_spread(replace(data, trend=trend), fit, start_torque, line, spread)
+    start_stderr = np.sqrt(line**2 + place)
+    if trend is not None:
+        start_torque = start_torque - trend.excess
+        start_stderr = start_stderr * trend.widening(data.start_direction)
     scale = _motion_scale(data.momenta, fit, spread)
     return replace(
         data,
         run_stderr=np.sqrt(_own_variance(evidence, data, fit) + spread.variance(travel)),
         start_torque=start_torque,
-        start_stderr=np.sqrt(line**2 + place),
+        start_stderr=start_stderr,
+        trend=trend,
         whitening=tuple(
             _whitening(motion, fit.values["inertia"], spread, scale=scale) for motion in data.momenta
         ),
@@ -239,11 +246,29 @@ def _onset_torque(starts: Sequence[Breakaway], fit: FrictionFit) -> tuple[FloatA
     return torque, error
 
 
+def _rate_trend(
+    starts: Sequence[Breakaway],
+    data: FitData,
+    fit: FrictionFit,
+    torque: FloatArray,
+    line: FloatArray,
+    spread: RunSpread,
+) -> RateTrend | None:
+    """The trend of onset torques (m,) over the ramp rates, weighed as the last trend makes their spread."""
+    rate = np.array([abs(start.line.rate) for start in starts])
+    place = _place_spread(data, fit, torque, line, spread)
+    return rate_trend(data.start_direction, rate, torque, np.sqrt(line**2 + place))
+
+
 def _place_spread(
     data: FitData, fit: FrictionFit, torque: FloatArray, line: FloatArray, spread: RunSpread
 ) -> float:
-    """Variance of F_s from place to place [(N m)^2], pooled over directions and with the runs' spread."""
+    """Variance of F_s from place to place [(N m)^2], pooled over directions and with the runs' spread.
+
+    `torque` (m,) is that at the onset, and the trend over ramp rates that the data know is no spread.
+    """
     excess, degrees = PRIOR_STARTS * spread.spread**2, PRIOR_STARTS
+    torque = torque if data.trend is None else torque - data.trend.excess
     for direction in data.model.directions:
         own = data.start_direction == SIGN[direction]
         if np.count_nonzero(own) < 2:
