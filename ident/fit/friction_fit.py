@@ -16,7 +16,7 @@ direction, gives the starts, so that no second minimum goes unseen.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Literal
 
 import lmfit
@@ -54,6 +54,10 @@ class FitData:
     whitening: tuple[FloatArray, ...]  # (k, k) for each momentum: the inverse square root of its covariance
     inertia: tuple[float, float] | None  # from the frequency response, with its standard error
     lines: tuple[Direction, ...] = ()  # directions without Stribeck effect: dF raises their breakaways alone
+    # (g, n + m): of the variance of each run, then each breakaway, the part that each estimated spread makes
+    shares: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
+    motion_dof: float = np.inf  # behind the scale of the momenta's covariance
+    inertia_dof: float = np.inf  # behind the standard error of the frequency response's inertia
 
     @property
     def has_inertia(self) -> bool:
@@ -112,6 +116,20 @@ def residuals(data: FitData, values: Mapping[str, float]) -> FloatArray:
         ]
     if data.inertia is not None:
         parts.append(np.array([(inertia - data.inertia[0]) / data.inertia[1]]))
+    return np.concatenate(parts)
+
+
+def in_order(
+    data: FitData, *, runs: FloatArray, starts: FloatArray, motion: float = 0.0, inertia: float = 0.0
+) -> FloatArray:
+    """What belongs to each run (n,) and each breakaway (m,), in the order of `residuals`."""
+    parts: list[FloatArray] = []
+    for direction in DIRECTIONS:
+        parts.append(runs[data.run_direction == SIGN[direction]])
+        parts.append(starts[data.start_direction == SIGN[direction]])
+        parts += [np.full(one.gain.size, motion) for one in data.momenta if one.direction == SIGN[direction]]
+    if data.inertia is not None:
+        parts.append(np.array([inertia]))
     return np.concatenate(parts)
 
 
@@ -174,12 +192,8 @@ def _polish(data: FitData, start: Mapping[str, float], *, free_beta: bool) -> lm
         )
 
 
-def _covariance(data: FitData, values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
-    """Inverse of the information of the free parameters (p, p).
-
-    lmfit gives up the errors of all where one parameter is not felt by the data (a Stribeck velocity without
-    a Stribeck effect); here that one alone has none.
-    """
+def jacobian(data: FitData, values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
+    """Slope of the residuals with the free parameters (N, p) [1/SI]."""
     columns = []
     for name in free:
         step = 1e-6 * max(abs(values[name]), 1e-9 * max(values.values()))
@@ -187,7 +201,16 @@ def _covariance(data: FitData, values: Mapping[str, float], free: Sequence[str])
             step = 1e-6 * values[name]
         ahead, behind = (residuals(data, {**values, name: values[name] + off}) for off in (step, -step))
         columns.append((ahead - behind) / (2 * step))
-    jacobian = np.column_stack(columns)
+    return np.column_stack(columns)
+
+
+def _covariance(data: FitData, values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
+    """Inverse of the information of the free parameters (p, p).
+
+    lmfit gives up the errors of all where one parameter is not felt by the data (a Stribeck velocity without
+    a Stribeck effect); here that one alone has none.
+    """
+    slopes = jacobian(data, values, free)
     # A Stribeck torque that ended at 0 is felt as F_s is, in parts of F_c.
     size = np.array(
         [
@@ -197,10 +220,10 @@ def _covariance(data: FitData, values: Mapping[str, float], free: Sequence[str])
             for name in free
         ]
     )
-    norm = np.linalg.norm(jacobian, axis=0)
+    norm = np.linalg.norm(slopes, axis=0)
     felt = (norm * size > FELT) | ((size == 0) & (norm > 0))
     covariance = np.diag(np.where(felt, 0.0, np.inf))
-    scaled = jacobian[:, felt] / norm[felt]
+    scaled = slopes[:, felt] / norm[felt]
     inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14, hermitian=True)
     covariance[np.ix_(felt, felt)] = inverse / np.outer(norm[felt], norm[felt])
     return covariance

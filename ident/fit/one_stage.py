@@ -50,11 +50,10 @@ def explain(evidence: Evidence, *, axis: Axis, assumptions: Assumptions) -> Expl
     for direction in DIRECTIONS:
         require_enough(weighted.data, direction, parameters=5 if free_beta else 4)
     unit = UNITS[axis]["inertia"]
-    dof = _degrees(weighted)
     sources: dict[str, Estimate] = {}
     findings: list[Finding] = []
     if evidence.momenta:
-        sources["breakaway"] = parameters(weighted.data, weighted.fit, axis=axis, dof=dof).inertia
+        sources["breakaway"] = parameters(weighted.data, weighted.fit, axis=axis).inertia
     if evidence.response is not None:
         response, refusal = _response_source(evidence.response, weighted, unit=unit)
         sources["frequency_response"] = response
@@ -62,20 +61,13 @@ def explain(evidence: Evidence, *, axis: Axis, assumptions: Assumptions) -> Expl
             findings.append(refusal)
         else:
             datum = (evidence.response.inertia, evidence.response.stderr)
-            weighted = with_inertia(evidence, weighted, datum, free_beta=free_beta)
-            dof = _degrees(weighted)
+            dof = evidence.response.dof
+            weighted = with_inertia(evidence, weighted, datum, dof=dof, free_beta=free_beta)
         findings += _disagreement(sources, unit)
-    values = parameters(weighted.data, weighted.fit, axis=axis, dof=dof)
+    values = parameters(weighted.data, weighted.fit, axis=axis)
     findings += [] if free_beta else shape_findings(weighted)
     findings += [*values.findings, *_fit_findings(weighted), *_offset_finding(values, axis)]
     return Explained(weighted, values, sources, tuple(findings))
-
-
-def _degrees(weighted: Weighted) -> int:
-    """Data beyond the free parameters: runs, breakaways, and one datum a ramp's motion."""
-    data = weighted.data
-    friction = sum(name != "inertia" for name in weighted.fit.free)
-    return max(data.torque.size + data.start_torque.size - friction, 1)
 
 
 def _response_source(

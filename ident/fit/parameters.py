@@ -12,6 +12,7 @@ from data.recording import Axis, FloatArray
 from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate
 from ident.fit.confidence import Interval, profiled, quantile, symmetric
 from ident.fit.friction_fit import DIRECTIONS, Direction, FitData, FrictionFit, residuals
+from ident.fit.small_samples import certainty
 from ident.fit.withholding import withheld
 
 UNITS: Mapping[Axis, Mapping[str, str]] = {
@@ -34,7 +35,13 @@ UNITS: Mapping[Axis, Mapping[str, str]] = {
         "torque_offset": "N",
     },
 }
-PROFILED = ("static_torque", "stribeck_velocity", "stribeck_shape")  # chi-square is a poor parabola in these
+PROFILED = (
+    "static_torque",
+    "coulomb_torque",
+    "viscous_damping",
+    "stribeck_velocity",
+    "stribeck_shape",
+)  # chi-square is a poor parabola in these
 
 
 @dataclass(frozen=True)
@@ -48,34 +55,41 @@ class Parameters:
     findings: tuple[Finding, ...]
 
 
-def parameters(data: FitData, fit: FrictionFit, *, axis: Axis, dof: int) -> Parameters:
+@dataclass(frozen=True)
+class _Physical:
+    """Errors in the law's own parameters 'inertia', 'positive.static_torque', ... with F_s = F_c + dF.
+
+    A parameter that the data do not feel has an infinite error and no place in the covariance.
+    """
+
+    stderr: Mapping[str, float]
+    dof: Mapping[str, float]
+    inflation: Mapping[str, float]  # of the variance, over what chi-square says
+    kept: tuple[str, ...]
+    covariance: FloatArray  # (k, k) of those kept
+
+
+def parameters(data: FitData, fit: FrictionFit, *, axis: Axis) -> Parameters:
     """Values, errors and intervals in the law's own parameters."""
-    names, matrix, stderr = _physical_covariance(fit)
+    errors = _physical(data, fit)
     units = UNITS[axis]
     findings: list[Finding] = []
     curves: dict[Direction, Mapping[str, Estimate]] = {}
     for direction in DIRECTIONS:
-        curve, own = _curve(data, fit, direction, stderr=stderr, dof=dof, units=units)
+        curve, own = _curve(data, fit, direction, errors=errors, units=units)
         curves[direction] = curve
         findings += own
-    mean = {
-        name: _mean(name, curves, (names, matrix), dof=dof, unit=units[name]) for name in CURVE_PARAMETERS
-    }
+    mean = {name: _mean(name, curves, errors, unit=units[name]) for name in CURVE_PARAMETERS}
     return Parameters(
-        inertia=_inertia(data, fit, stderr, dof=dof, unit=units["inertia"]),
+        inertia=_inertia(data, fit, errors, unit=units["inertia"]),
         curves=curves,
         mean=mean,
-        covariance=Covariance(names, matrix),
+        covariance=Covariance(errors.kept, errors.covariance),
         findings=tuple(findings),
     )
 
 
-def _physical_covariance(fit: FrictionFit) -> tuple[tuple[str, ...], FloatArray, dict[str, float]]:
-    """Names 'inertia', 'positive.static_torque', ..., their covariance with F_s = F_c + dF, and standard
-    errors.
-
-    A parameter that the data do not feel has an infinite error and no place in the covariance.
-    """
+def _physical(data: FitData, fit: FrictionFit) -> _Physical:
     names = []
     transform = np.eye(len(fit.free))
     for row, name in enumerate(fit.free):
@@ -85,10 +99,18 @@ def _physical_covariance(fit: FrictionFit) -> tuple[tuple[str, ...], FloatArray,
             parameter = "static_torque"
         names.append(f"{direction}.{parameter}" if parameter else name)
     lost = np.isinf(np.diag(fit.covariance))
-    matrix = np.asarray(transform @ np.where(np.isinf(fit.covariance), 0.0, fit.covariance) @ transform.T)
+    found = certainty(data, fit)
+    matrix = np.asarray(transform @ np.where(np.isinf(found.covariance), 0.0, found.covariance) @ transform.T)
     spread = np.where(lost, np.inf, np.sqrt(np.diag(matrix)))
-    kept = tuple(name for name, gone in zip(names, lost, strict=True) if not gone)
-    return kept, matrix[np.ix_(~lost, ~lost)], dict(zip(names, map(float, spread), strict=True))
+    dof = [1.0 if gone else found.dof(row) for row, gone in zip(transform, lost, strict=True)]
+    inflation = [1.0 if gone else found.inflation(row) for row, gone in zip(transform, lost, strict=True)]
+    return _Physical(
+        dict(zip(names, spread.tolist(), strict=True)),
+        dict(zip(names, dof, strict=True)),
+        dict(zip(names, inflation, strict=True)),
+        tuple(name for name, gone in zip(names, lost, strict=True) if not gone),
+        matrix[np.ix_(~lost, ~lost)],
+    )
 
 
 def _curve(
@@ -96,8 +118,7 @@ def _curve(
     fit: FrictionFit,
     direction: Direction,
     *,
-    stderr: Mapping[str, float],
-    dof: int,
+    errors: _Physical,
     units: Mapping[str, str],
 ) -> tuple[Mapping[str, Estimate], tuple[Finding, ...]]:
     coulomb, stribeck, velocity, damping, shape = fit.law(direction)
@@ -108,13 +129,18 @@ def _curve(
         "stribeck_shape": shape,
         "viscous_damping": damping,
     }
-    own = {name: stderr[f"{direction}.{name}"] for name in values if f"{direction}.{name}" in stderr}
-    interval = {name: symmetric(values[name], error, dof, least=0.0) for name, error in own.items()}
+    known = {name: f"{direction}.{name}" for name in values if f"{direction}.{name}" in errors.stderr}
+    own = {name: errors.stderr[key] for name, key in known.items()}
+    dof = {name: errors.dof[key] for name, key in known.items()}
+    interval = {name: symmetric(values[name], error, dof[name], least=0.0) for name, error in own.items()}
     position = fit.free.index(f"{direction}_stribeck_torque")
-    interval["stribeck_torque"] = symmetric(stribeck, float(np.sqrt(fit.covariance[position, position])), dof)
+    interval["stribeck_torque"] = symmetric(
+        stribeck, float(np.sqrt(fit.covariance[position, position])), dof["static_torque"]
+    )
+    height = {name: quantile(dof[name]) ** 2 * errors.inflation[key] for name, key in known.items()}
     for name in PROFILED:
         if name in own and np.isfinite(own[name]) and stribeck > 0:
-            interval[name] = _profile(data, fit, direction, name, stderr=own[name], dof=dof)
+            interval[name] = _profile(data, fit, direction, name, stderr=own[name], height=height[name])
     kept = withheld(data, fit, direction, stderr=own, interval=interval)
     estimates = {}
     for name, value in values.items():
@@ -129,7 +155,7 @@ def _curve(
 
 
 def _profile(
-    data: FitData, fit: FrictionFit, direction: Direction, name: str, *, stderr: float, dof: int
+    data: FitData, fit: FrictionFit, direction: Direction, name: str, *, stderr: float, height: float
 ) -> Interval:
     """Profile of one parameter; for F_s the fit is written in F_c and F_s - F_c all the same."""
     free = list(fit.free)
@@ -148,15 +174,14 @@ def _profile(
         best[index] += best[coulomb]
     least = np.array([0.05 if key.endswith("shape") else 0.0 for key in free])
     least = np.where([key.endswith("velocity") for key in free], 1e-9 * best, least)
-    return profiled(own, best, index, stderr=stderr, dof=dof, least=least)
+    return profiled(own, best, index, stderr=stderr, height=height, least=least)
 
 
 def _mean(
     name: str,
     curves: Mapping[Direction, Mapping[str, Estimate]],
-    covariance: tuple[tuple[str, ...], FloatArray],
+    errors: _Physical,
     *,
-    dof: int,
     unit: str,
 ) -> Estimate:
     """Mean of the two directions: of what Table 1 calls the symmetric model."""
@@ -168,9 +193,12 @@ def _mean(
     value = 0.5 * sum(values)
     if any(estimate.fixed for estimate in pair):
         return Estimate(value, unit, fixed=True)
-    names, matrix = covariance
-    where = [names.index(f"{direction}.{name}") for direction in DIRECTIONS]
-    stderr = 0.5 * float(np.sqrt(matrix[np.ix_(where, where)].sum()))
+    keys = [f"{direction}.{name}" for direction in DIRECTIONS]
+    where = [errors.kept.index(key) for key in keys]
+    stderr = 0.5 * float(np.sqrt(errors.covariance[np.ix_(where, where)].sum()))
+    # Each direction's variance has its own degrees of freedom (Satterthwaite 1946).
+    parts = np.array([0.25 * errors.stderr[key] ** 2 for key in keys])
+    dof = float(parts.sum() ** 2 / np.sum(parts**2 / np.array([errors.dof[key] for key in keys])))
     ends = symmetric(value, stderr, dof, least=0.0)
     ends = _opened(ends, pair)
     return Estimate(value, unit, stderr, (ends.low, ends.high))
@@ -186,9 +214,7 @@ def _opened(ends: Interval, pair: list[Estimate]) -> Interval:
     return ends
 
 
-def _inertia(
-    data: FitData, fit: FrictionFit, stderr: Mapping[str, float], *, dof: int, unit: str
-) -> Estimate:
+def _inertia(data: FitData, fit: FrictionFit, errors: _Physical, *, unit: str) -> Estimate:
     if not data.has_inertia:
         return Estimate(
             None,
@@ -198,8 +224,8 @@ def _inertia(
             "runs do not hold the inertia. Record ramps until the link runs, or a multisine about a bias "
             "speed.",
         )
-    value, error = fit.values["inertia"], float(stderr["inertia"])
+    value, error = fit.values["inertia"], errors.stderr["inertia"]
     if not (value > 0 and np.isfinite(error)):
         return Estimate(None, unit, withheld="E-BOUND: the inertia ended at its bound 0; record a multisine.")
-    reach = quantile(dof) * error
+    reach = quantile(errors.dof["inertia"]) * error
     return Estimate(value, unit, error, (max(value - reach, 0.0), value + reach))
