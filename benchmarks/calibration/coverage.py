@@ -3,9 +3,10 @@
     python -m benchmarks.calibration --only coverage
 
 Coverage counts over all campaigns of a design: a withheld parameter claims nothing, an open interval is an
-interval. Beside each share stands the share of campaigns with a bounded interval whose interval misses, and of
-those withheld. lmfit is given the same points and asked as a reader of its manual would: least squares, a start
-read off the map, the covariance scaled by chi-square, value +- 1.96 stderr.
+interval. Beside each share stand the parts of the campaigns in which the parameter was withheld and in which
+its interval had two ends, and how many of the latter miss. lmfit is given the same points and asked as its
+manual's first page does: least squares, a start read off the map, the covariance scaled by chi-square, and
+value +- 1.96 stderr.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from scipy.stats import beta
 
 from benchmarks.calibration.synthetic import DESIGNS, Campaign, Design, campaign
 from benchmarks.rows import Row, figure
+from data.recording import FloatArray
 from ident.estimate import Estimate
 from ident.evidence.gathering import Evidence
 from ident.fit.assumptions import Assumptions
@@ -181,11 +183,11 @@ def _plain_fit(
     asked.add("viscous_damping", value=max(slope, 1e-3 * float(torque.max() / speed.max())), min=0.0)
     asked.add("stribeck_shape", value=1.0, min=0.05, max=8.0, vary=free_beta)
 
-    def misfit(at: lmfit.Parameters) -> np.ndarray:
+    def misfit(at: lmfit.Parameters) -> FloatArray:
         v = at.valuesdict()
         fading = np.exp(-((speed / v["stribeck_velocity"]) ** v["stribeck_shape"]))
         dry = v["coulomb_torque"] + (v["static_torque"] - v["coulomb_torque"]) * fading
-        return torque - dry - v["viscous_damping"] * speed
+        return np.asarray(torque - dry - v["viscous_damping"] * speed)
 
     with np.errstate(all="ignore"):
         return lmfit.minimize(misfit, asked)

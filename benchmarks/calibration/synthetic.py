@@ -1,7 +1,7 @@
 r"""Synthetic campaigns: evidence drawn from a law and from instruments that are both known.
 
-A campaign is made where the logs have already become data (`ident.evidence`), so that thousands of them can be
-had: steady runs, breakaways and an inertia from the frequency response, each with every error that its
+A campaign is made where the logs have already become data (`ident.evidence`), so that thousands of them can
+be had: steady runs, breakaways and an inertia from the frequency response, each with every error that its
 description speaks of, and no others:
 
 - a steady run's torque has white noise and a difference from run to run, and its speed is the slope of a
@@ -10,7 +10,8 @@ description speaks of, and no others:
   the link has moved by counts, by which time the ramp has risen (`ident.response.breakaway_delay`);
 - the inertia has an error whose size is itself an estimate with few degrees of freedom.
 
-Every other rig is the published one, give or take a tenth; the rest are unlike it in torque, speed and inertia.
+Every other rig is the published one, give or take a tenth; the rest are unlike it in torque, speed and
+inertia.
 """
 
 from __future__ import annotations
