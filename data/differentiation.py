@@ -30,16 +30,17 @@ import math
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from filterpy.common import Q_continuous_white_noise, kinematic_kf, kinematic_state_transition
+from filterpy.common import Q_continuous_white_noise, kinematic_state_transition
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_discrete_are
 from scipy.signal import lfilter
 
 from data.findings import LogError
+from data.kinematic_smoother import smooth
 
 FloatArray = NDArray[np.float64]
 _GAP: Final = 3.0  # median steps
@@ -155,29 +156,12 @@ def _steady_gain(ratio: float) -> tuple[FloatArray, float]:
 
 def _smooth(steps: FloatArray, position: FloatArray, ratio: float) -> FloatArray:
     """Filter and smooth one piece in scaled units: velocity, acceleration, their standard errors (4, m)."""
-    model: Any = kinematic_kf(dim=1, order=2, dt=1.0)
-    model.Q = Q_continuous_white_noise(3, dt=1.0, spectral_density=ratio)
-    start, doubt = _start(np.cumsum([0.0, *steps[: _FEWEST - 1].tolist()]), position[:_FEWEST], model.Q)
-    model.x, model.P = start[:, None], doubt
-    transitions = drives = None
-    if np.any(np.abs(steps - 1.0) > _JITTER):
-        # The filter predicts before each measurement; the first prediction goes nowhere.
-        spans = [0.0, *steps.tolist()]
-        transitions = [kinematic_state_transition(2, h) for h in spans]
-        drives = [Q_continuous_white_noise(3, dt=h, spectral_density=ratio) for h in spans]
-    else:
-        back = np.asarray(kinematic_state_transition(2, -1.0))
-        model.x, model.P = back @ model.x, back @ model.P @ back.T  # the first prediction undoes this
-    means, covariances, _, _ = model.batch_filter(position, Fs=transitions, Qs=drives)
-    states, spreads, _, _ = model.rts_smoother(means, covariances, Fs=transitions, Qs=drives)
-    return np.stack(
-        (
-            states[:, 1, 0],
-            states[:, 2, 0],
-            np.sqrt(np.maximum(spreads[:, 1, 1], 0.0)),
-            np.sqrt(np.maximum(spreads[:, 2, 2], 0.0)),
-        )
-    )
+    even = bool(np.all(np.abs(steps - 1.0) <= _JITTER))
+    if even:
+        steps = np.ones_like(steps)
+    drive = np.asarray(Q_continuous_white_noise(3, dt=1.0, spectral_density=ratio))
+    start, doubt = _start(np.cumsum([0.0, *steps[: _FEWEST - 1].tolist()]), position[:_FEWEST], drive)
+    return smooth(steps, even, position, ratio, start, doubt)
 
 
 def _start(time: FloatArray, position: FloatArray, drive: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 from data.findings import Finding, Severity
 from data.recording import Axis, Recording
-from ident.estimate import Estimate, IdentifiedRobot
-from ident.evidence.frequency_response import FrequencyInertia
+from ident.estimate import IdentifiedRobot
 from ident.evidence.friction_map import MapPoint
 from ident.evidence.gathering import (
     Evidence,
@@ -27,9 +26,8 @@ from ident.evidence.gathering import (
 )
 from ident.evidence.ripple_correction import ripple_findings
 from ident.fit.assumptions import DEFAULT, Assumptions
-from ident.fit.friction_fit import DIRECTIONS, SIGN
+from ident.fit.law_model import DIRECTIONS, SIGN
 from ident.fit.one_stage import explain
-from ident.fit.parameters import UNITS
 from ident.fit.weighting import Weighted
 
 
@@ -40,14 +38,16 @@ class Identification:
     robot: IdentifiedRobot
     friction_map: tuple[MapPoint, ...]
     fit_report: str  # lmfit's own
-    response: FrequencyInertia | None  # for figures, whether the fit used it or not
+    evidence: Evidence  # used or not
+    weighted: Weighted
 
 
 def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFAULT) -> Identification:
     """Fit the friction law of each direction and the inertia to the recordings of one rig.
 
-    Raises `IdentificationError` where no law can be had: a direction without
-    usable runs (E-DIRECTION), a torque of the wrong sign (E-SIGN), too few data (E-FEW).
+    A direction without usable steady runs is withheld. Raises `IdentificationError` where no law can be had:
+    no usable run in either direction (E-DIRECTION), a torque of the wrong sign (E-SIGN), too few data
+    (E-FEW).
     """
     if not recordings:
         raise IdentificationError("no recordings: nothing to identify. List logs under [[experiment]].")
@@ -68,13 +68,8 @@ def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFA
         positive=values.curves["positive"],
         negative=values.curves["negative"],
         mean=values.mean,
-        torque_offset=Estimate(
-            None,
-            UNITS[axis]["torque_offset"],
-            withheld="E-OFFSET: no torque-driven experiment separates a constant offset from an asymmetry of "
-            "friction; the laws are those of the torque as logged. A zero-torque reference would tell.",
-        ),
-        runs=run_uses(recordings, evidence),
+        torque_offset=values.torque_offset,
+        runs=run_uses(recordings, explained.evidence),
         notes=tuple(notes),
         covariance=values.covariance,
         inertia_sources=explained.inertia_sources,
@@ -82,7 +77,8 @@ def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFA
         simulated=any(recording.simulated for recording in recordings),
     )
     weighted = explained.weighted
-    return Identification(robot, friction_map(evidence, weighted), weighted.fit.report, evidence.response)
+    points = friction_map(explained.evidence, weighted)
+    return Identification(robot, points, explained.report, explained.evidence, weighted)
 
 
 def friction_map(evidence: Evidence, weighted: Weighted) -> tuple[MapPoint, ...]:

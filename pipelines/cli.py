@@ -118,6 +118,7 @@ def identify(
     choose_beta: option.ChooseBeta = False,
     one_law: option.OneLaw = False,
     per_direction: option.PerDirection = False,
+    advise: option.Advise = False,
     salvage: option.Salvage = False,
     jobs: option.Jobs = None,
     quiet: option.Quiet = False,
@@ -133,7 +134,7 @@ def identify(
     loaded = load_campaign(campaign)
     folder = open_results(_place(out, loaded.owner), loaded.owner, force=force)
     assumptions = _assumptions(free_beta, choose_beta, one_law, per_direction)
-    options = RunOptions(assumptions=assumptions, salvage=salvage, jobs=jobs)
+    options = RunOptions(assumptions=assumptions, advised=advise, salvage=salvage, jobs=jobs)
     with shown_progress(quiet=quiet) as progress:
         missing = identify_campaign(loaded, folder, options, progress=progress)
     _answer_table(folder, missing, quiet=quiet, as_json=as_json)
@@ -446,8 +447,10 @@ def _answer(document: Mapping[str, object], lines: Sequence[object], *, quiet: b
 
 def _answer_table(folder: ResultFolder, missing: list[str], *, quiet: bool, as_json: bool) -> None:
     table = (folder.path / "table1.md").read_text(encoding="utf-8")
-    lines = [table, *printed.withheld(missing), folder.path]
-    _answer(_document(folder, "robot.json"), lines, quiet=quiet, as_json=as_json)
+    lines = [table, *printed.withheld(missing)]
+    if "advice.json" in folder.written:
+        lines += printed.advice(_document(folder, "advice.json"))
+    _answer(_document(folder, "robot.json"), [*lines, folder.path], quiet=quiet, as_json=as_json)
 
 
 def _end_of_run(folder: ResultFolder, missing: list[str], *, quiet: bool, as_json: bool) -> Status:

@@ -2,7 +2,7 @@
 
 Writes `robot.json` (`pipelines.results.robot_file`), `friction_map.csv` (a row a point or a run left out,
 columns as the fields of `ident.evidence.friction_map.MapPoint`), `fit_report.txt`, Table 1 as `.csv`, `.md`
-and `.tex`, and `figure2.svg`.
+and `.tex`, and `figure2.svg`; with --advise also `advice.json` (`pipelines.results.advice_file`).
 """
 
 from __future__ import annotations
@@ -12,12 +12,15 @@ from collections.abc import Mapping
 from dataclasses import astuple, fields, replace
 
 from data.recording import Axis
+from ident.advice import advise
 from ident.estimate import IdentifiedRobot
 from ident.evidence.friction_map import MapPoint
 from ident.fit.assumptions import DEFAULT, Assumptions
+from ident.fit.parameters import UNITS
 from ident.identification import Identification
 from ident.identification import identify as fit
 from pipelines.recordings import ReadLogs
+from pipelines.results.advice_file import write_advice
 from pipelines.results.folder import ResultFolder
 from pipelines.results.robot_file import write_robot
 from pipelines.settings.loop import LoopDefaults
@@ -39,9 +42,12 @@ def write_identification(
     *,
     loop: LoopDefaults,
     axis: Axis,
+    advised: bool = False,
     truth: Mapping[str, object] | None = None,
 ) -> None:
-    """All files of `identify`; `truth` is what truth.json of a virtual rig holds."""
+    """All files of `identify`, `advised` those of --advise too; `truth` is what a virtual rig's truth.json
+    holds.
+    """
     from pipelines.report.friction_figures import figure2  # noqa: PLC0415  (matplotlib)
     from pipelines.report.style import svg_text  # noqa: PLC0415
     from pipelines.report.tables import table1_csv, table1_markdown, table1_tex  # noqa: PLC0415
@@ -58,6 +64,9 @@ def write_identification(
     folder.write_text("table1.csv", table1_csv(document, truth=truth))
     folder.write_text("table1.md", table1_markdown(document, truth=truth))
     folder.write_text("table1.tex", table1_tex(document, truth=truth))
+    if advised:
+        units = {**UNITS[axis], "critical_observer_gain": "1/s"}
+        write_advice(folder, advise(found.evidence, found.weighted), units)
     figure = figure2(found.friction_map, robot.robot(), axis=axis, simulated=robot.simulated)
     folder.write_text("figure2.svg", svg_text(figure))
 

@@ -54,6 +54,7 @@ class RunOptions:
     """What the command line said of a run."""
 
     assumptions: Assumptions = DEFAULT
+    advised: bool = False  # on what to record next
     salvage: bool = False
     law: LawChoice = "per-direction"
     compensator: LawChoice | None = None
@@ -166,7 +167,12 @@ def _identified(
     found = identify(logs, assumptions=options.assumptions)
     tick(1)
     write_identification(
-        found, folder, loop=campaign.loop_defaults(), axis=campaign.rig.axis, truth=read_truth(campaign)
+        found,
+        folder,
+        loop=campaign.loop_defaults(),
+        axis=campaign.rig.axis,
+        advised=options.advised,
+        truth=read_truth(campaign),
     )
     missing = withheld_parameters(found.robot)
     missing += left_out(found.robot, frozenset(use.log for use in logs.excluded))

@@ -13,7 +13,7 @@ from typing import Final
 
 from benchmarks.rows import Row, show
 
-PARTS: Final[tuple[str, ...]] = ("coverage",)
+PARTS: Final = ("bias", "coverage", "smoother")
 
 
 def main() -> None:

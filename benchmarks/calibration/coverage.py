@@ -29,7 +29,7 @@ from data.recording import FloatArray
 from ident.estimate import Estimate
 from ident.evidence.gathering import Evidence
 from ident.fit.assumptions import Assumptions
-from ident.fit.friction_fit import DIRECTIONS, SIGN, Direction
+from ident.fit.law_model import DIRECTIONS, SIGN, Direction
 from ident.fit.one_stage import explain
 
 CAMPAIGNS: Final = 1000  # a design

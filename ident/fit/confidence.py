@@ -38,7 +38,7 @@ def quantile(dof: float) -> float:
     return float(student.ppf(0.5 + 0.5 * LEVEL, max(dof, 1.0)))
 
 
-def symmetric(value: float, stderr: float, dof: float, *, least: float | None = None) -> Interval:
+def symmetric(value: float, stderr: float, dof: int, *, least: float | None = None) -> Interval:
     """value +- t stderr, cut at `least`, below which the parameter cannot lie."""
     reach = quantile(dof) * stderr
     low = value - reach
@@ -46,7 +46,7 @@ def symmetric(value: float, stderr: float, dof: float, *, least: float | None = 
 
 
 def profiled(
-    residual: Residuals, best: FloatArray, index: int, *, stderr: float, height: float, least: FloatArray
+    residual: Residuals, best: FloatArray, index: int, *, stderr: float, dof: int, least: FloatArray
 ) -> Interval:
     """Profile-likelihood interval of parameter `index`.
 
@@ -55,9 +55,9 @@ def profiled(
     residual : of parameters (p,) to residuals in standard errors
     best : (p,) the parameters of the least chi-square
     stderr : of the parameter, for the first step
-    height : by which chi-square rises at the interval's ends
     least : (p,) lower bounds of the parameters
     """
+    height = quantile(dof) ** 2
     base = float(np.sum(residual(best) ** 2))
     low = _end(residual, best, index, -stderr, base=base, height=height, least=least)
     high = _end(residual, best, index, stderr, base=base, height=height, least=least)

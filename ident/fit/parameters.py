@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from data.findings import Finding
 from data.recording import Axis, FloatArray
 from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate
-from ident.fit.confidence import Interval, profiled, quantile, symmetric
-from ident.fit.friction_fit import DIRECTIONS, Direction, FitData, FrictionFit, residuals
+from ident.fit.confidence import Interval, quantile
+from ident.fit.fit_data import FitData
+from ident.fit.friction_fit import FrictionFit
+from ident.fit.law_model import COMMON, DIRECTIONS, Direction, LawName
+from ident.fit.profiles import Combination, Profile, law_combinations, profiles
 from ident.fit.small_samples import certainty
+from ident.fit.unseen_effect import with_unseen_effect
 from ident.fit.withholding import withheld
 
 UNITS: Mapping[Axis, Mapping[str, str]] = {
@@ -35,152 +39,156 @@ UNITS: Mapping[Axis, Mapping[str, str]] = {
         "torque_offset": "N",
     },
 }
-PROFILED = (
-    "static_torque",
-    "coulomb_torque",
-    "viscous_damping",
-    "stribeck_velocity",
-    "stribeck_shape",
-)  # chi-square is a poor parabola in these
+_ONE_LAW = "one law for both directions was fitted: see mean"
+_NO_OFFSET = (
+    "E-OFFSET: no torque-driven experiment separates a constant offset from an asymmetry of friction; the "
+    "laws are those of the torque as logged. A zero-torque reference would tell, or --one-law, if one law "
+    "holds for both directions."
+)
+_ONE_WAY = "E-DIRECTION: a torque offset shows only as a difference between two directions."
 
 
 @dataclass(frozen=True)
 class Parameters:
     """The parameters of the law of both directions and their mean."""
 
+    fit: FrictionFit  # whose they are
     inertia: Estimate
     curves: Mapping[Direction, Mapping[str, Estimate]]
     mean: Mapping[str, Estimate]
+    torque_offset: Estimate
     covariance: Covariance
+    profiles: Mapping[str, Profile]  # by name: 'inertia', 'positive.static_torque', ..., those of `mean` too
     findings: tuple[Finding, ...]
 
 
-@dataclass(frozen=True)
-class _Physical:
-    """Errors in the law's own parameters 'inertia', 'positive.static_torque', ... with F_s = F_c + dF.
+def parameters(
+    data: FitData,
+    fit: FrictionFit,
+    *,
+    axis: Axis,
+    missing: Mapping[Direction, str] | None = None,
+) -> Parameters:
+    """Values, errors and intervals in the law's own parameters; `missing`: why a direction has no law."""
+    known = certainty(data, fit)
 
-    A parameter that the data do not feel has an infinite error and no place in the covariance.
-    """
+    def height(combination: Combination) -> float:
+        own = np.array([combination.get(name, 0.0) for name in fit.free])
+        return quantile(known.dof(own)) ** 2 * known.inflation(own)
 
-    stderr: Mapping[str, float]
-    dof: Mapping[str, float]
-    inflation: Mapping[str, float]  # of the variance, over what chi-square says
-    kept: tuple[str, ...]
-    covariance: FloatArray  # (k, k) of those kept
-
-
-def parameters(data: FitData, fit: FrictionFit, *, axis: Axis) -> Parameters:
-    """Values, errors and intervals in the law's own parameters."""
-    errors = _physical(data, fit)
+    wanted = _combinations(fit)
+    better, found = profiles(data, fit, wanted, height=height)
+    found = with_unseen_effect(data, found, wanted, height=height)
+    if better is not fit:
+        fit, known = better, certainty(data, better)
+    names, matrix, stderr = _physical_covariance(fit, known.covariance)
     units = UNITS[axis]
     findings: list[Finding] = []
+    laws: dict[LawName, Mapping[str, Estimate]] = {}
+    for law in data.model.laws:
+        laws[law], own = _curve(data, fit, law, stderr=stderr, found=found, units=units)
+        findings += own
     curves: dict[Direction, Mapping[str, Estimate]] = {}
     for direction in DIRECTIONS:
-        curve, own = _curve(data, fit, direction, errors=errors, units=units)
-        curves[direction] = curve
-        findings += own
-    mean = {name: _mean(name, curves, errors, unit=units[name]) for name in CURVE_PARAMETERS}
+        why = _ONE_LAW if data.model.has_offset else (missing or {}).get(direction, "")
+        lacking = {name: Estimate(None, units[name], withheld=why) for name in CURVE_PARAMETERS}
+        curves[direction] = laws.get(direction, lacking)
+    mean = laws.get("mean") or {
+        name: _mean(name, curves, (names, matrix), found, unit=units[name]) for name in CURVE_PARAMETERS
+    }
     return Parameters(
-        inertia=_inertia(data, fit, errors, unit=units["inertia"]),
+        fit=fit,
+        inertia=_inertia(data, fit, stderr, found, unit=units["inertia"]),
         curves=curves,
         mean=mean,
-        covariance=Covariance(errors.kept, errors.covariance),
+        torque_offset=_offset(fit, stderr, found, unit=units["torque_offset"]),
+        covariance=Covariance(names, matrix),
+        profiles={name: profile for name, profile in found.items() if "stribeck_torque" not in name},
         findings=tuple(findings),
     )
 
 
-def _physical(data: FitData, fit: FrictionFit) -> _Physical:
+def _combinations(fit: FrictionFit) -> dict[str, Combination]:
+    """Every parameter that has a finite error, and the means of two directions, as the fit has them."""
+    felt = {name for name, gone in zip(fit.free, np.isinf(np.diag(fit.covariance)), strict=True) if not gone}
+    wanted: dict[str, Combination] = {name: {name: 1.0} for name in COMMON}
+    own = {law: law_combinations(law) for law in fit.model.laws}
+    for law, combinations in own.items():
+        wanted |= {f"{law}.{name}": combination for name, combination in combinations.items()}
+    if set(own) == set(DIRECTIONS):
+        for name in CURVE_PARAMETERS:
+            both = {**own["positive"][name], **own["negative"][name]}
+            wanted[f"mean.{name}"] = dict.fromkeys(both, 0.5)
+    return {name: combination for name, combination in wanted.items() if felt.issuperset(combination)}
+
+
+def _physical_covariance(
+    fit: FrictionFit, covariance: FloatArray
+) -> tuple[tuple[str, ...], FloatArray, dict[str, float]]:
+    """Names 'inertia', 'positive.static_torque', ..., their covariance with F_s = F_c + dF, and standard
+    errors, from the covariance of the free parameters.
+
+    A parameter that the data do not feel has an infinite error and no place in the covariance.
+    """
     names = []
     transform = np.eye(len(fit.free))
     for row, name in enumerate(fit.free):
-        direction, _, parameter = name.partition("_")
+        if name in COMMON:
+            names.append(name)
+            continue
+        law, _, parameter = name.partition("_")
         if parameter == "stribeck_torque":
-            transform[row, fit.free.index(f"{direction}_coulomb_torque")] = 1.0
+            transform[row, fit.free.index(f"{law}_coulomb_torque")] = 1.0
             parameter = "static_torque"
-        names.append(f"{direction}.{parameter}" if parameter else name)
-    lost = np.isinf(np.diag(fit.covariance))
-    found = certainty(data, fit)
-    matrix = np.asarray(transform @ np.where(np.isinf(found.covariance), 0.0, found.covariance) @ transform.T)
+        names.append(f"{law}.{parameter}")
+    lost = np.isinf(np.diag(covariance))
+    matrix = np.asarray(transform @ np.where(np.isinf(covariance), 0.0, covariance) @ transform.T)
     spread = np.where(lost, np.inf, np.sqrt(np.diag(matrix)))
-    dof = [1.0 if gone else found.dof(row) for row, gone in zip(transform, lost, strict=True)]
-    inflation = [1.0 if gone else found.inflation(row) for row, gone in zip(transform, lost, strict=True)]
-    return _Physical(
-        dict(zip(names, spread.tolist(), strict=True)),
-        dict(zip(names, dof, strict=True)),
-        dict(zip(names, inflation, strict=True)),
-        tuple(name for name, gone in zip(names, lost, strict=True) if not gone),
-        matrix[np.ix_(~lost, ~lost)],
-    )
+    kept = tuple(name for name, gone in zip(names, lost, strict=True) if not gone)
+    return kept, matrix[np.ix_(~lost, ~lost)], dict(zip(names, map(float, spread), strict=True))
 
 
 def _curve(
     data: FitData,
     fit: FrictionFit,
-    direction: Direction,
+    law: LawName,
     *,
-    errors: _Physical,
+    stderr: Mapping[str, float],
+    found: Mapping[str, Profile],
     units: Mapping[str, str],
 ) -> tuple[Mapping[str, Estimate], tuple[Finding, ...]]:
-    coulomb, stribeck, velocity, damping, shape = fit.law(direction)
-    values = {
-        "static_torque": coulomb + stribeck,
-        "coulomb_torque": coulomb,
-        "stribeck_velocity": velocity,
-        "stribeck_shape": shape,
-        "viscous_damping": damping,
-    }
-    known = {name: f"{direction}.{name}" for name in values if f"{direction}.{name}" in errors.stderr}
-    own = {name: errors.stderr[key] for name, key in known.items()}
-    dof = {name: errors.dof[key] for name, key in known.items()}
-    interval = {name: symmetric(values[name], error, dof[name], least=0.0) for name, error in own.items()}
-    position = fit.free.index(f"{direction}_stribeck_torque")
-    interval["stribeck_torque"] = symmetric(
-        stribeck, float(np.sqrt(fit.covariance[position, position])), dof["static_torque"]
-    )
-    height = {name: quantile(dof[name]) ** 2 * errors.inflation[key] for name, key in known.items()}
-    for name in PROFILED:
-        if name in own and np.isfinite(own[name]) and stribeck > 0:
-            interval[name] = _profile(data, fit, direction, name, stderr=own[name], height=height[name])
-    kept = withheld(data, fit, direction, stderr=own, interval=interval)
+    values = law_values(fit.values, law)
+    own = {name: stderr[f"{law}.{name}"] for name in values if f"{law}.{name}" in stderr}
+    interval = {name: _interval(found, f"{law}.{name}") for name in (*own, "stribeck_torque")}
+    kept = withheld(data, fit, law, stderr=own, interval=interval)
     estimates = {}
-    for name, value in values.items():
+    for name in CURVE_PARAMETERS:
         if name in kept.reasons:
             estimates[name] = Estimate(None, units[name], withheld=kept.reasons[name])
         elif name not in own:
-            estimates[name] = Estimate(value, units[name], fixed=True)
+            estimates[name] = Estimate(values[name], units[name], fixed=True)
         else:
             ends = (interval[name].low, interval[name].high)
-            estimates[name] = Estimate(value, units[name], float(own[name]), ends)
+            estimates[name] = Estimate(values[name], units[name], float(own[name]), ends)
     return estimates, kept.findings
 
 
-def _profile(
-    data: FitData, fit: FrictionFit, direction: Direction, name: str, *, stderr: float, height: float
-) -> Interval:
-    """Profile of one parameter; for F_s the fit is written in F_c and F_s - F_c all the same."""
-    free = list(fit.free)
-    static = name == "static_torque"
-    index = free.index(f"{direction}_{'stribeck_torque' if static else name}")
-    coulomb = free.index(f"{direction}_coulomb_torque")
+def law_values(values: Mapping[str, float], law: LawName) -> dict[str, float]:
+    """The parameters of a law by name of `CURVE_PARAMETERS`, without a torque offset."""
+    own = {name: values[f"{law}_{name}"] for name in CURVE_PARAMETERS if name != "static_torque"}
+    return {"static_torque": values[f"{law}_coulomb_torque"] + values[f"{law}_stribeck_torque"], **own}
 
-    def own(x: FloatArray) -> FloatArray:
-        values = dict(fit.values) | dict(zip(free, x, strict=True))
-        if static:
-            values[free[index]] = max(x[index] - x[coulomb], 0.0)
-        return residuals(data, values)
 
-    best = np.array([fit.values[key] for key in free])
-    if static:
-        best[index] += best[coulomb]
-    least = np.array([0.05 if key.endswith("shape") else 0.0 for key in free])
-    least = np.where([key.endswith("velocity") for key in free], 1e-9 * best, least)
-    return profiled(own, best, index, stderr=stderr, height=height, least=least)
+def _interval(found: Mapping[str, Profile], name: str) -> Interval:
+    """The interval of a profile; open both ways where there is none."""
+    return found[name].interval if name in found else Interval(None, None)
 
 
 def _mean(
     name: str,
     curves: Mapping[Direction, Mapping[str, Estimate]],
-    errors: _Physical,
+    covariance: tuple[tuple[str, ...], FloatArray],
+    found: Mapping[str, Profile],
     *,
     unit: str,
 ) -> Estimate:
@@ -191,30 +199,33 @@ def _mean(
         lacking = "; ".join(estimate.withheld for estimate in pair if estimate.withheld)
         return Estimate(None, unit, withheld=lacking)
     value = 0.5 * sum(values)
-    if any(estimate.fixed for estimate in pair):
+    if all(estimate.fixed for estimate in pair):
         return Estimate(value, unit, fixed=True)
-    keys = [f"{direction}.{name}" for direction in DIRECTIONS]
-    where = [errors.kept.index(key) for key in keys]
-    stderr = 0.5 * float(np.sqrt(errors.covariance[np.ix_(where, where)].sum()))
-    # Each direction's variance has its own degrees of freedom (Satterthwaite 1946).
-    parts = np.array([0.25 * errors.stderr[key] ** 2 for key in keys])
-    dof = float(parts.sum() ** 2 / np.sum(parts**2 / np.array([errors.dof[key] for key in keys])))
-    ends = symmetric(value, stderr, dof, least=0.0)
-    ends = _opened(ends, pair)
+    names, matrix = covariance
+    where = [names.index(own) for d in DIRECTIONS if (own := f"{d}.{name}") in names]
+    stderr = 0.5 * float(np.sqrt(matrix[np.ix_(where, where)].sum()))
+    ends = _interval(found, f"mean.{name}")
+    if any(estimate.fixed for estimate in pair):
+        (free,) = (estimate for estimate in pair if not estimate.fixed)
+        ends = _shifted(free, value)
     return Estimate(value, unit, stderr, (ends.low, ends.high))
 
 
-def _opened(ends: Interval, pair: list[Estimate]) -> Interval:
-    """An end that either direction leaves open is open in the mean."""
-    for estimate in pair:
-        low, high = estimate.interval95 or (None, None)
-        ends = replace(
-            ends, low=ends.low if low is not None else None, high=ends.high if high is not None else None
-        )
-    return ends
+def _shifted(free: Estimate, mean: float) -> Interval:
+    """The interval of the mean of a free value and one that is fixed."""
+    low, high = free.interval95 or (None, None)
+    ends = [None if end is None else mean + 0.5 * (end - (free.value or 0.0)) for end in (low, high)]
+    return Interval(ends[0], ends[1])
 
 
-def _inertia(data: FitData, fit: FrictionFit, errors: _Physical, *, unit: str) -> Estimate:
+def _inertia(
+    data: FitData,
+    fit: FrictionFit,
+    stderr: Mapping[str, float],
+    found: Mapping[str, Profile],
+    *,
+    unit: str,
+) -> Estimate:
     if not data.has_inertia:
         return Estimate(
             None,
@@ -224,8 +235,18 @@ def _inertia(data: FitData, fit: FrictionFit, errors: _Physical, *, unit: str) -
             "runs do not hold the inertia. Record ramps until the link runs, or a multisine about a bias "
             "speed.",
         )
-    value, error = fit.values["inertia"], errors.stderr["inertia"]
+    value, error = fit.values["inertia"], float(stderr["inertia"])
     if not (value > 0 and np.isfinite(error)):
         return Estimate(None, unit, withheld="E-BOUND: the inertia ended at its bound 0; record a multisine.")
-    reach = quantile(errors.dof["inertia"]) * error
-    return Estimate(value, unit, error, (max(value - reach, 0.0), value + reach))
+    ends = _interval(found, "inertia")
+    return Estimate(value, unit, error, (ends.low, ends.high))
+
+
+def _offset(
+    fit: FrictionFit, stderr: Mapping[str, float], found: Mapping[str, Profile], *, unit: str
+) -> Estimate:
+    if not fit.model.has_offset:
+        both = len(fit.model.laws) == len(DIRECTIONS)
+        return Estimate(None, unit, withheld=_NO_OFFSET if both else _ONE_WAY)
+    ends = _interval(found, "torque_offset")
+    return Estimate(fit.values["torque_offset"], unit, stderr["torque_offset"], (ends.low, ends.high))

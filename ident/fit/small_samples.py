@@ -27,9 +27,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from data.recording import FloatArray
-from ident.fit.friction_fit import FitData, FrictionFit, in_order, jacobian
+from ident.fit.fit_data import FitData
+from ident.fit.friction_fit import FrictionFit, in_order, jacobian
 
 SLIGHT = 1e-4  # share of every datum's variance under which a spread plays no part
+LEAST = (
+    0.25  # information on a spread's relative error, of half a degree of freedom: less is none to expand in
+)
+DEPENDENT = 1e-10  # singular value, of the largest, below which slopes are dependent
 
 
 @dataclass(frozen=True)
@@ -84,12 +89,15 @@ def certainty_of(slopes: FloatArray, plain: FloatArray, shares: FloatArray, dof:
     """
     plays = (shares.max(axis=1, initial=0.0) > SLIGHT) & ~np.isinf(dof)
     shares, dof = shares[plays], dof[plays]
-    left = np.eye(len(slopes)) - slopes @ plain @ slopes.T
+    span, size, _ = np.linalg.svd(slopes / np.linalg.norm(slopes, axis=0), full_matrices=False)
+    span = span[:, size > DEPENDENT * size[0]]
+    left = np.eye(len(slopes)) - span @ span.T
     information = 0.5 * shares @ left**2 @ shares.T
     known = np.isfinite(dof)
     information[known] = information[:, known] = 0.0
     information[known, known] = 0.5 * dof[known]
-    strays = np.linalg.pinv(information, hermitian=True)
+    told, ways = np.linalg.eigh(information)
+    strays = (ways / np.maximum(told, LEAST)) @ ways.T
     felt_by = np.einsum("ip,gi,iq->gpq", slopes, shares, slopes)  # J' F_g J
     squared = np.einsum("ip,gi,gh,hi,iq->pq", slopes, shares, strays, shares, slopes, optimize=True)
     crossed = np.einsum("gh,gpq,qr,hrs->ps", strays, felt_by, plain, felt_by, optimize=True)

@@ -46,6 +46,30 @@ def diagram(document: Mapping[str, Any]) -> list[str]:
     return [*lines, *document["notes"]]
 
 
+def advice(document: Mapping[str, Any]) -> list[str]:
+    """What to record next, a few lines a quantity."""
+    lines = ["what to record next: half-width of the 95 % interval, as expected"]
+    for one in document["advice"]:
+        what = f"{one['direction']} {one['quantity'].replace('_', ' ')} [{one['unit']}]"
+        if one["why_none"] is not None:
+            lines.append(f"  {what}: {one['why_none']}")
+            continue
+        now, then = _number(one["half_width_now"], "unbounded"), _number(one["half_width_then"])
+        reduced = "" if one["reduction"] is None else f" (-{100 * one['reduction']:.0f} %)"
+        lines.append(f"  {what}: {now} now, {then} with all of these{reduced}")
+        lines += [f"    {_next_run(run)}" for run in one["runs"]]
+    return lines
+
+
+def _next_run(run: Mapping[str, Any]) -> str:
+    after = f"then {_number(run['half_width'])}"
+    if run["protocol"] == "breakaway":
+        rate = f"at {_number(run['ramp_rate'])} a second"
+        return f"{run['times']} x breakaway, {run['direction']}, {rate}; {after}"
+    speed = f"speed {_number(run['speed'])} for {_number(run['duration'])} s"
+    return f"{run['times']} x constant velocity, {run['direction']}, {speed}; {after}"
+
+
 def comparison(document: Mapping[str, Any]) -> list[str]:
     """The onsets and how far prediction and record agree."""
     lines = ["onset of limit cycling, r", ONSET_ROW.format("start", *ONSET_COLUMNS)]

@@ -43,6 +43,7 @@ FreeBeta = Annotated[bool, typer.Option("--free-beta", help="Fit the Stribeck sh
 ChooseBeta = Annotated[
     bool, typer.Option("--choose-beta", help="Fit the Stribeck shape where the data earn it (AICc), else 1.")
 ]
+Advise = Annotated[bool, typer.Option("--advise", help="Say what to record next for v_s, F_s and L_c.")]
 OneLaw = Annotated[bool, typer.Option("--one-law", help="One law for both directions, and a torque offset.")]
 PerDirection = Annotated[
     bool, typer.Option("--per-direction", help="A law for each direction, and no torque offset.")

@@ -27,7 +27,7 @@ def test_a_linear_models_profile_is_its_t_interval() -> None:
     def residual(p: FloatArray) -> FloatArray:
         return np.asarray(y / 0.1 - basis @ p)
 
-    found = profiled(residual, best, 1, stderr=stderr, height=quantile(10) ** 2, least=np.full(2, -np.inf))
+    found = profiled(residual, best, 1, stderr=stderr, dof=10, least=np.full(2, -np.inf))
     expected = symmetric(float(best[1]), stderr, 10)
     assert found.low == pytest.approx(expected.low, rel=5e-3)
     assert found.high == pytest.approx(expected.high, rel=5e-3)
@@ -39,9 +39,7 @@ def test_an_end_that_nothing_bounds_is_open() -> None:
     def residual(p: FloatArray) -> FloatArray:
         return np.asarray((y - np.exp(-X / p[0])) / 0.01)
 
-    found = profiled(
-        residual, np.array([1e-3]), 0, stderr=1e-3, height=quantile(11) ** 2, least=np.array([1e-9])
-    )
+    found = profiled(residual, np.array([1e-3]), 0, stderr=1e-3, dof=11, least=np.array([1e-9]))
     assert found.low is None
     assert found.high is not None
     assert 1e-3 < found.high < 0.05
