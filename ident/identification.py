@@ -73,6 +73,7 @@ def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFA
         notes=tuple(notes),
         covariance=values.covariance,
         inertia_sources=explained.inertia_sources,
+        profiles=values.profiles,
         axis=axis,
         simulated=any(recording.simulated for recording in recordings),
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from data.findings import Finding
 from data.recording import Axis, FloatArray
-from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate
+from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate, ProfilePoints
 from ident.fit.confidence import Interval, quantile
 from ident.fit.fit_data import FitData
 from ident.fit.friction_fit import FrictionFit
@@ -58,7 +58,7 @@ class Parameters:
     mean: Mapping[str, Estimate]
     torque_offset: Estimate
     covariance: Covariance
-    profiles: Mapping[str, Profile]  # by name: 'inertia', 'positive.static_torque', ..., those of `mean` too
+    profiles: Mapping[str, ProfilePoints]  # 'inertia', 'positive.static_torque', ..., those of `mean` too
     findings: tuple[Finding, ...]
 
 
@@ -103,7 +103,7 @@ def parameters(
         mean=mean,
         torque_offset=_offset(fit, stderr, found, unit=units["torque_offset"]),
         covariance=Covariance(names, matrix),
-        profiles={name: profile for name, profile in found.items() if "stribeck_torque" not in name},
+        profiles={name: own.points for name, own in found.items() if not name.endswith("stribeck_torque")},
         findings=tuple(findings),
     )
 

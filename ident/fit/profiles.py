@@ -9,12 +9,13 @@ first to a bound that the law itself has (F_c, b, J at 0), that bound is the end
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from data.recording import FloatArray
+from ident.estimate import ProfilePoints
 from ident.fit.confidence import Interval
 from ident.fit.fit_data import FitData
 from ident.fit.friction_fit import FrictionFit, fit_friction, vector
@@ -28,10 +29,9 @@ TRIALS = 3  # times that a better minimum, found along a profile, becomes the fi
 
 @dataclass(frozen=True)
 class Profile:
-    """Points of a profile, by value, and the 95 % interval that they bound."""
+    """Points of a profile, the best fit among them, and the 95 % interval that they bound."""
 
-    value: FloatArray  # (k,) [unit of the parameter], the best fit among them
-    rise: FloatArray  # (k,) of chi-square over the best fit [-]
+    points: ProfilePoints
     interval: Interval
 
 
@@ -91,15 +91,19 @@ def _profile(
             named = dict(zip(data.model.names, x, strict=True))
             named |= {name: np.exp(value) for name, value in named.items() if name.endswith("velocity")}
             begun = FrictionFit(data.model, named, fit.free, fit.covariance, cost[0], None)
-            return Profile(points[0][:, 0], points[0][:, 1], Interval(None, None)), fit_friction(
-                data, start=begun
-            )
+            return Profile(_by_value(points), Interval(None, None)), fit_friction(data, start=begun)
         points.append(memory[:count].copy())
         closed = limit if ended == BOUND and known else None
         ends.append(float(memory[count - 1, 0]) if ended == REACHED else closed)
+    return Profile(_by_value(points), Interval(ends[0], ends[1])), None
+
+
+def _by_value(points: Sequence[FloatArray]) -> ProfilePoints:
+    """Value and rise of parts of a profile (k, 2), each value once; none whose chi-square overflows."""
     joined = np.concatenate(points)
-    joined = joined[np.argsort(joined[:, 0], kind="stable")]
-    return Profile(joined[:, 0], joined[:, 1], Interval(ends[0], ends[1])), None
+    joined = joined[np.all(np.isfinite(joined), axis=1)]
+    value, first = np.unique(joined[:, 0], return_index=True)
+    return ProfilePoints(value, joined[first, 1])
 
 
 def _value(data: FitData, x: FloatArray, combination: Combination) -> float:

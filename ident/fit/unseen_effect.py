@@ -39,7 +39,7 @@ def with_unseen_effect(
     asked = {name: wanted[name] for name in harmed}
     _, curved = profiles(bent, fit_friction(bent), asked, height=height)
     return {
-        name: replace(profile, interval=_hull(profile.interval, curved[name].interval))
+        name: replace(curved[name], interval=_hull(profile.interval, curved[name].interval))
         if name in harmed
         else profile
         for name, profile in found.items()

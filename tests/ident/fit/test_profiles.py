@@ -53,12 +53,12 @@ def test_every_point_is_the_least_chi_square_with_its_value_held(
     data = simulated(truth, np.random.default_rng(11), model=model, ramps=int(name == "inertia"))
     fit = fit_friction(data)
     _, found = profiles(data, fit, {name: combination}, height=lambda _: quantile(DOF) ** 2)
-    profile = found[name]
+    profile = found[name].points
     assert profile.value.size >= 5
     assert np.all(np.diff(profile.value) > 0)
     for value, rise in zip(profile.value[[0, -1]], profile.rise[[0, -1]], strict=True):
         assert rise == pytest.approx(_held(data, fit, combination, value) - fit.chi_square, rel=1e-4)
-    for end in (profile.interval.low, profile.interval.high):
+    for end in (found[name].interval.low, found[name].interval.high):
         assert end is not None
         risen = _held(data, fit, combination, end) - fit.chi_square
         assert risen == pytest.approx(quantile(DOF) ** 2, rel=2e-3)
