@@ -48,10 +48,11 @@ def profiles(
 
     That is the fit given, or a better one where a profile has led to it.
     """
+    height = quantile(dof) ** 2
     for _ in range(TRIALS):
         found: dict[str, Profile] = {}
         for name, combination in wanted.items():
-            profile, better = _profile(data, fit, combination, dof=dof)
+            profile, better = _profile(data, fit, combination, height)
             if better is not None:
                 fit = better
                 break
@@ -62,13 +63,13 @@ def profiles(
 
 
 def _profile(
-    data: FitData, fit: FrictionFit, combination: Combination, *, dof: int
+    data: FitData, fit: FrictionFit, combination: Combination, height: float
 ) -> tuple[Profile, FrictionFit | None]:
+    """The profile, and the better fit that it has led to, if it has."""
     problem, box, work = data.problem, data.box, data.work
     best, cost = vector(data, fit.values)[None, :], np.zeros(1)
     refit_each(problem, best, box, work, cost)
     problem.combination[:] = [combination.get(name, 0.0) for name in data.model.names]
-    height = quantile(dof) ** 2
     centre = _value(data, best[0], combination)
     step = np.sqrt(height) * _stderr(fit, combination)
     effect = {name: share for name, share in combination.items() if name.endswith("stribeck_torque")}
