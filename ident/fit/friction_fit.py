@@ -17,7 +17,7 @@ writes the report.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import lmfit
@@ -88,6 +88,32 @@ def residuals(data: FitData, values: Mapping[str, float]) -> FloatArray:
     if data.inertia is not None:
         parts.append(np.array([(inertia - data.inertia[0]) / data.inertia[1]]))
     return np.concatenate(parts)
+
+
+def in_order(
+    data: FitData, *, runs: FloatArray, starts: FloatArray, motion: float = 0.0, inertia: float = 0.0
+) -> FloatArray:
+    """What belongs to each run (n,) and each breakaway (m,), in the order of `residuals`."""
+    parts: list[FloatArray] = []
+    for direction in data.model.directions:
+        parts.append(runs[data.run_direction == SIGN[direction]])
+        parts.append(starts[data.start_direction == SIGN[direction]])
+        parts += [np.full(one.gain.size, motion) for one in data.momenta if one.direction == SIGN[direction]]
+    if data.inertia is not None:
+        parts.append(np.array([inertia]))
+    return np.concatenate(parts)
+
+
+def jacobian(data: FitData, values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
+    """Slope of the residuals with the free parameters (N, p) [1/SI], by central differences."""
+    columns = []
+    for name in free:
+        step = 1e-6 * max(abs(values[name]), 1e-9 * max(values.values()))
+        if name.endswith("stribeck_velocity"):
+            step = 1e-6 * values[name]
+        ahead, behind = (residuals(data, {**values, name: values[name] + off}) for off in (step, -step))
+        columns.append((ahead - behind) / (2 * step))
+    return np.column_stack(columns)
 
 
 def fit_friction(data: FitData, *, start: FrictionFit | None = None) -> FrictionFit:
