@@ -26,7 +26,9 @@ from compensation.controller import GAIN_OF
 from compensation.cycle_ends import CycleEvent, Neighbourhood, crossing, end_of
 from compensation.cycle_modes import Stick, events_of, mode_sequence, stick_phases
 from compensation.loop_cycles import distance, mirrored
+from compensation.loop_parameters import own_time
 from compensation.loop_section import LoopSection, with_gain
+from compensation.loop_starts import start_sizes
 from compensation.orbits.continuation import Curve, CurveEvent, Steps, trace
 from compensation.orbits.cycle_equation import JOINED, CycleEquation
 from compensation.orbits.periodic_orbits import Cycle, cycle_at, find_cycle, shoot
@@ -37,8 +39,7 @@ from ident.simulation.filippov_system import FloatArray
 
 Gain = Literal["r", "L", "n1", "n2"]
 
-STARTS: Final = (0.6, -0.6, 0.1, -0.1)  # x1(0) [rad] from which the first cycle is looked for
-VANISHED: Final = 1e-5  # [rad] extent of a cycle that has become a point
+VANISHED: Final = 3e-5  # of the widest cycle: extent of one that has become a point
 MOST_BRANCHES: Final = 12
 SAME: Final = 1e-3  # relative difference of extremes and period: so near to a known branch, a cycle is on it
 BARELY: Final = 1e-9  # relative difference of gains that are one
@@ -87,7 +88,8 @@ def cycle_branches(
     value = _checked(loop, gain, span)
     section = LoopSection(loop)
     todo: list[tuple[float, Cycle]] = []
-    for x1 in STARTS[: 1 if section.symmetric else None]:
+    far, near = start_sizes(loop, "r", np.array([loop.controller.gains.compensation]))[0].tolist()
+    for x1 in (far, near) if section.symmetric else (far, -far, near, -near):
         cycle = find_cycle(section, np.array([x1, 0.0]))
         if isinstance(cycle, Cycle):
             todo.append((value, cycle))
@@ -165,8 +167,8 @@ def _follow(
         duration = float(np.sum(section(p).follow(x, cycle.returns).durations))
         return ", ".join(mode_sequence(events_of(section(p).loop, x, duration)))
 
-    equation = CycleEquation(section, cycle.returns, sequence, span, VANISHED)
-    scale = np.array([amplitude, amplitude, span[1] - span[0]])
+    equation = CycleEquation(section, cycle.returns, sequence, span, VANISHED * amplitude)
+    scale = np.array([amplitude, amplitude / own_time(loop.modes), span[1] - span[0]])
     up = np.array([0.0, 0.0, 1.0])
     ways = [
         trace(equation, (cycle.point, value), ahead=way, scale=scale, span=span, steps=steps)

@@ -60,6 +60,14 @@ class Covariance:
 
 
 @dataclass(frozen=True)
+class ProfilePoints:
+    """Points of a profile likelihood, by value; where the rise is 0 lies the estimate."""
+
+    value: FloatArray  # (k,) [unit of the parameter]
+    rise: FloatArray  # (k,) of chi-square over its least, all other parameters refitted [-]
+
+
+@dataclass(frozen=True)
 class IdentifiedRobot:
     """The fit, as robot.json holds it."""
 
@@ -72,6 +80,9 @@ class IdentifiedRobot:
     notes: tuple[Finding, ...]
     covariance: Covariance
     inertia_sources: Mapping[str, Estimate] = field(default_factory=dict)  # by protocol, for comparison
+    profiles: Mapping[str, ProfilePoints] = field(
+        default_factory=dict
+    )  # named as `covariance`, and 'mean. ...'
     axis: str = "rotary"
     simulated: bool = False
 

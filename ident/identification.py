@@ -32,13 +32,13 @@ from ident.excitation.excited_law import ExcitedLaw, excited_law
 from ident.excitation.inverse_dynamics import Law
 from ident.excitation.report import report
 from ident.fit.assumptions import DEFAULT, Assumptions
+from ident.fit.cross_check import bootstrap_table
 from ident.fit.excitation_parameters import (
-    NO_OFFSET,
     compare_inertia,
     excitation_parameters,
     excited_inertia,
 )
-from ident.fit.friction_fit import DIRECTIONS, SIGN
+from ident.fit.law_model import DIRECTIONS, SIGN
 from ident.fit.one_stage import explain
 from ident.fit.parameters import UNITS
 from ident.fit.weighting import Weighted
@@ -50,16 +50,23 @@ class Identification:
 
     robot: IdentifiedRobot
     friction_map: tuple[MapPoint, ...]
-    fit_report: str  # lmfit's own, and how an excitation was taken apart
+    fit_report: str  # lmfit's own, the shapes that were compared, the bootstrap, the excitation
     evidence: Evidence  # used or not
     weighted: Weighted | None  # None where the law rests on excitation alone
 
 
-def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFAULT) -> Identification:
+def identify(
+    recordings: Sequence[Recording],
+    *,
+    assumptions: Assumptions = DEFAULT,
+    generator: np.random.Generator | None = None,
+) -> Identification:
     """Fit the friction law and the inertia to the recordings of one rig.
 
-    Raises `IdentificationError` where no law can be had: a direction without
-    usable runs (E-DIRECTION), a torque of the wrong sign (E-SIGN), too few data (E-FEW).
+    With a generator, the report holds the intervals of a bootstrap over runs beside those of the profiles.
+    A direction without usable steady runs is withheld. Raises `IdentificationError` where no law can be had:
+    no usable run in either direction (E-DIRECTION), a torque of the wrong sign (E-SIGN), too few data
+    (E-FEW).
     """
     if not recordings:
         raise IdentificationError("no recordings: nothing to identify. List logs under [[experiment]].")
@@ -71,12 +78,16 @@ def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFA
     excited = excited_law(excitations, law=law, axis=axis) if excitations else "no excitation log"
     if alone:
         return _from_excitation(recordings, evidence, excited)
-    found = _from_evidence(recordings, evidence, assumptions=assumptions)
+    found = _from_evidence(recordings, evidence, assumptions=assumptions, generator=generator)
     return _with_excitation(found, excited) if excitations else found
 
 
 def _from_evidence(
-    recordings: Sequence[Recording], evidence: Evidence, *, assumptions: Assumptions
+    recordings: Sequence[Recording],
+    evidence: Evidence,
+    *,
+    assumptions: Assumptions,
+    generator: np.random.Generator | None,
 ) -> Identification:
     """The law from constant speeds, breakaways and frequency responses."""
     axis = recordings[0].axis
@@ -95,17 +106,21 @@ def _from_evidence(
         positive=values.curves["positive"],
         negative=values.curves["negative"],
         mean=values.mean,
-        torque_offset=Estimate(None, UNITS[axis]["torque_offset"], withheld=NO_OFFSET),
-        runs=run_uses(recordings, evidence),
+        torque_offset=values.torque_offset,
+        runs=run_uses(recordings, explained.evidence),
         notes=tuple(notes),
         covariance=values.covariance,
         inertia_sources=explained.inertia_sources,
+        profiles=values.profiles,
         axis=axis,
         simulated=any(recording.simulated for recording in recordings),
     )
     weighted = explained.weighted
-    points = friction_map(evidence, weighted)
-    return Identification(robot, points, weighted.fit.report, evidence, weighted)
+    points = friction_map(explained.evidence, weighted)
+    fit_report = explained.report
+    if generator is not None:
+        fit_report = f"{fit_report}\n\n{bootstrap_table(weighted.data, values, generator)}"
+    return Identification(robot, points, fit_report, explained.evidence, weighted)
 
 
 def _from_excitation(

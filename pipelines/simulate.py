@@ -24,6 +24,7 @@ from compensation.controller import Controller
 from compensation.sampled_loop import Sampling, run_sampled
 from data.mcap.writer import write_mcap
 from data.recording import Axis, FloatArray
+from ident.model.numbers import LARGEST, is_quantity
 from ident.model.robot import OneLinkRobot
 from ident.response import respond
 from pipelines.exit_status import RefusalError, UsageError
@@ -62,8 +63,10 @@ def parse_start(text: str) -> tuple[float, float, float]:
         values = [float(word) for word in words]
     except ValueError:
         values = []
-    if len(values) != _START_WORDS or not all(map(math.isfinite, values)):
-        raise UsageError(f"--x0 is {text!r}: give three finite numbers, x1,x2,x3 [rad, rad/s, rad/s]")
+    if len(values) != _START_WORDS or not all(map(is_quantity, values)):
+        raise UsageError(
+            f"--x0 is {text!r}: give three finite numbers up to {LARGEST:g}, x1,x2,x3 [rad, rad/s, rad/s]"
+        )
     return values[0], values[1], values[2]
 
 

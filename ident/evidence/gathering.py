@@ -106,8 +106,8 @@ def _without_hunting(
 
 
 def require_evidence(recordings: Sequence[Recording], evidence: Evidence) -> None:
-    """Raise `IdentificationError` where a direction is missing or the torque's sign is wrong."""
-    _require_directions(recordings, evidence)
+    """Raise `IdentificationError` where no direction has a steady run, or the torque's sign is wrong."""
+    _require_a_direction(recordings, evidence)
     _require_sign(evidence)
 
 
@@ -160,37 +160,29 @@ def _of(recordings: Iterable[Recording], protocol: ProtocolName) -> list[Recordi
     return [recording for recording in recordings if recording.protocol == protocol]
 
 
-def _require_directions(recordings: Sequence[Recording], evidence: Evidence) -> None:
-    for sign, name in ((1, "positive"), (-1, "negative")):
-        if any(run.direction == sign for run in evidence.used_runs):
-            continue
-        seen = sorted({recording.protocol for recording in recordings})
-        logs = sum(recording.protocol == "constant_velocity" for recording in recordings)
-        left_out = [run for run in evidence.runs if run.why is not None and run.velocity * sign > 0]
-        also = (
-            f" {len(left_out)} run(s) that way were left out; the first: {left_out[0].why}"
-            if left_out
-            else ""
-        )
-        raise IdentificationError(
-            f"E-DIRECTION: no usable constant-velocity run with {name} velocity ({logs} constant_velocity "
-            "log(s); "
-            f"protocols seen: {', '.join(seen) or 'none'}).{also} F_c, v_s and b of that direction cannot be "
-            f"told, and the other direction's law is never copied. Record constant speeds with {name} "
-            "velocity, "
-            f"in ratio from slow to fast; they give {IDENTIFIES['constant_velocity']}."
-        )
+def _require_a_direction(recordings: Sequence[Recording], evidence: Evidence) -> None:
+    if evidence.used_runs:
+        return
+    seen = sorted({recording.protocol for recording in recordings})
+    logs = sum(recording.protocol == "constant_velocity" for recording in recordings)
+    left_out = [run for run in evidence.runs if run.why is not None]
+    also = f" {len(left_out)} run(s) were left out; the first: {left_out[0].why}" if left_out else ""
+    raise IdentificationError(
+        f"E-DIRECTION: no usable constant-velocity run in either direction ({logs} constant_velocity log(s); "
+        f"protocols seen: {', '.join(seen) or 'none'}).{also} Record constant speeds with positive and with "
+        f"negative velocity, in ratio from slow to fast; they give {IDENTIFIES['constant_velocity']}."
+    )
 
 
 def _require_sign(evidence: Evidence) -> None:
     against = []
     for sign in (1, -1):
         own = [run.torque * sign for run in evidence.used_runs if run.direction == sign]
-        against.append(sum(own) < 0)
+        against += [sum(own) < 0] if own else []
     if all(against):
         run = evidence.used_runs[0]
         raise IdentificationError(
-            f"E-SIGN: the torque acts against the motion in both directions (for example {run.log}: "
+            f"E-SIGN: the torque acts against the motion in every direction (for example {run.log}: "
             f"{run.torque:.4g} N m at {run.velocity:.4g} rad/s): friction would drive the link. Set `sign = "
             "-1` for "
             "torque or for position in [signals]."

@@ -47,7 +47,7 @@ class ExcitedLaw:
     law: Law
     values: Mapping[str, float]  # by the names of `ident.excitation.inverse_dynamics`
     names: tuple[str, ...]  # of the covariance
-    covariance: FloatArray  # (p, p)
+    covariance: FloatArray  # (p, p) [product of the parameters' units]
     dof: int
     terms: FrictionTerms
     cutoff: float  # [Hz]

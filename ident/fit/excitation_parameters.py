@@ -17,7 +17,7 @@ from data.recording import Axis
 from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate
 from ident.excitation.excited_law import ExcitedLaw
 from ident.fit.confidence import quantile, symmetric
-from ident.fit.friction_fit import DIRECTIONS, Direction
+from ident.fit.law_model import DIRECTIONS, Direction
 from ident.fit.one_stage import COMPATIBLE
 from ident.fit.parameters import UNITS
 
