@@ -26,7 +26,6 @@ class Span:
     """Evenly sampled signals (n,) without a gap."""
 
     log: str
-    start_time: float  # [s]
     period: float  # h [s]
     position: FloatArray  # [rad]
     torque: FloatArray  # [N m]
@@ -61,9 +60,7 @@ def _span(recording: Recording, first: int, past: int, period: float) -> Span:
         torque = np.interp(even, time, torque)
         reference = None if reference is None else np.interp(even, time, reference)
         saturated = np.interp(even, time, saturated.astype(np.float64)) > 0.0
-    return Span(
-        recording.log, float(time[0]), own, position, torque, reference, saturated, recording.resolution
-    )
+    return Span(recording.log, own, position, torque, reference, saturated, recording.resolution)
 
 
 def _saturated(recording: Recording) -> NDArray[np.bool_]:
