@@ -129,12 +129,17 @@ def run_uses(recordings: Sequence[Recording], evidence: Evidence) -> tuple[RunUs
         if recording.protocol == "set_point":
             why = "a set-point run: the prediction is held against it, nothing is fitted to it"
         elif recording.protocol == "excitation":
-            why = "an excitation run: the friction map does not use it"
+            why = "an excitation run: it is fitted apart from the friction map"
         else:
             nothing = "no start from rest under a ramp was found"
             why = evidence.response_reasons.get(log) or "; ".join(reasons.get(log, [nothing]))
         uses.append(RunUse(log, recording.sha256, recording.protocol, used=False, why=why))
     return tuple(uses)
+
+
+def log_findings(recordings: Sequence[Recording]) -> list[Finding]:
+    """What the reader and the screening saw."""
+    return [finding for recording in recordings for finding in recording.findings]
 
 
 def run_findings(evidence: Evidence) -> tuple[Finding, ...]:

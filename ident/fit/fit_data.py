@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -38,6 +38,11 @@ class FitData:
     whitening: tuple[FloatArray, ...]  # (k, k) for each momentum: the inverse square root of its covariance
     inertia: tuple[float, float] | None  # from the frequency response, with its standard error
     trend: RateTrend | None = None  # over the ramp rates, that the start torques are less of
+    # (g, n + m): of the variance of each run, then each breakaway, the part that each estimated spread makes
+    shares: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))  # [-]
+    motion_dof: float = np.inf  # behind the scale of the momenta's covariance [-]
+    longest: float = STRAIGHT  # v_s that the fit may try, in parts of the fastest speed [-]
+    inertia_dof: float = np.inf  # behind the standard error of the frequency response's inertia [-]
 
     @property
     def has_inertia(self) -> bool:
@@ -64,7 +69,7 @@ class FitData:
         for place, name in enumerate(names):
             if name.endswith("stribeck_velocity"):
                 low[place] = np.log(UNFELT * float(np.min(self.speed)))
-                high[place] = np.log(STRAIGHT * float(np.max(self.speed)))
+                high[place] = np.log(self.longest * float(np.max(self.speed)))
                 reach[place] = 1.5
             elif name.endswith("stribeck_torque"):
                 high[place] = LARGEST_EFFECT * float(np.max(np.abs(self.torque)))

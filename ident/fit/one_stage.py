@@ -29,6 +29,7 @@ from ident.fit.missing_direction import Missing, missing_directions, of_directio
 from ident.fit.parameters import UNITS, Parameters, parameters
 from ident.fit.ramp_rates import trend_finding
 from ident.fit.second_minimum import minimum_findings, without_disputed
+from ident.fit.small_samples import certainty
 from ident.fit.stribeck_effect import where_it_shows
 from ident.fit.weighting import Weighted, settle, with_inertia
 from ident.fit.withholding import require_enough
@@ -73,11 +74,10 @@ def explain(evidence: Evidence, *, axis: Axis, assumptions: Assumptions) -> Expl
             findings.append(refusal)
         else:
             datum = (evidence.response.inertia, evidence.response.stderr)
-            weighted = with_inertia(evidence, weighted, datum)
+            weighted = with_inertia(evidence, weighted, datum, dof=evidence.response.dof)
         findings += _disagreement(sources, unit)
     fit, report = polished(weighted.data, weighted.fit)
-    dof = _degrees(weighted)
-    values = parameters(weighted.data, fit, axis=axis, dof=dof, missing=missing.reasons)
+    values = parameters(weighted.data, fit, axis=axis, missing=missing.reasons)
     weighted = replace(weighted, fit=values.fit)
     values = with_bounds(without_disputed(values), evidence)
     findings += shape_findings(weighted) if assumptions.shape == "fixed" else []
@@ -100,19 +100,14 @@ def _model(assumptions: Assumptions, missing: Missing) -> LawModel:
 def _inertia_of(weighted: Weighted, unit: str) -> Estimate:
     """The inertia of a fit with the interval of its standard error."""
     value = weighted.fit.values["inertia"]
+    found = certainty(weighted.data, weighted.fit)
+    own = np.array([float(name == "inertia") for name in weighted.fit.free])
     place = weighted.fit.free.index("inertia")
-    error = float(np.sqrt(weighted.fit.covariance[place, place]))
+    error = float(np.sqrt(found.covariance[place, place]))
     if not (value > 0 and np.isfinite(error)):
         return Estimate(None, unit, withheld="E-BOUND: the inertia ended at its bound 0; record a multisine.")
-    reach = quantile(_degrees(weighted)) * error
+    reach = quantile(found.dof(own)) * error
     return Estimate(value, unit, error, (max(value - reach, 0.0), value + reach))
-
-
-def _degrees(weighted: Weighted) -> int:
-    """Data beyond the free parameters: runs, breakaways, and one datum a ramp's motion."""
-    data = weighted.data
-    friction = sum(name != "inertia" for name in weighted.fit.free)
-    return max(data.torque.size + data.start_torque.size - friction, 1)
 
 
 def _response_source(

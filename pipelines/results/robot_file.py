@@ -7,6 +7,7 @@ whether it was used and why not, `notes` the findings. Beside these, for the que
 - `axis` ("rotary" or "linear") and `simulated` (the logs came from a virtual rig);
 - `covariance`: `{"names": ["inertia", "positive.static_torque", ...], "matrix": [[...]]}`, the joint
   covariance of the free parameters in the units of their product, from which prediction intervals are drawn;
+  where one law for both directions was fitted its names are "mean.static_torque", ..., "torque_offset";
 - `profiles`: by name as in `covariance`, and for those of `mean`, `{"value": [...], "rise": [...]}`: points
   of the profile likelihood, from low values to high, and the rise of chi-square over its least, all other
   parameters refitted. A 95 % interval ends where it has risen by the square of Student's quantile;
@@ -112,8 +113,7 @@ class RobotFile:
 def withheld_parameters(robot: IdentifiedRobot) -> list[str]:
     """A sentence for each parameter that the robot needs and that is withheld."""
     entries = {"inertia": robot.inertia}
-    entries |= {f"positive.{name}": robot.positive[name] for name in CURVE_PARAMETERS}
-    entries |= {f"negative.{name}": robot.negative[name] for name in CURVE_PARAMETERS}
+    entries |= {f"{key}.{name}": law[name] for key, law in robot.laws().items() for name in CURVE_PARAMETERS}
     return [f"{name} is withheld: {entry.withheld}" for name, entry in entries.items() if entry.value is None]
 
 
