@@ -39,10 +39,10 @@ class FitData:
     inertia: tuple[float, float] | None  # from the frequency response, with its standard error
     trend: RateTrend | None = None  # over the ramp rates, that the start torques are less of
     # (g, n + m): of the variance of each run, then each breakaway, the part that each estimated spread makes
-    shares: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    motion_dof: float = np.inf  # behind the scale of the momenta's covariance
-    longest: float = STRAIGHT  # v_s that the fit may try, in parts of the fastest speed
-    inertia_dof: float = np.inf  # behind the standard error of the frequency response's inertia
+    shares: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))  # [-]
+    motion_dof: float = np.inf  # behind the scale of the momenta's covariance [-]
+    longest: float = STRAIGHT  # v_s that the fit may try, in parts of the fastest speed [-]
+    inertia_dof: float = np.inf  # behind the standard error of the frequency response's inertia [-]
 
     @property
     def has_inertia(self) -> bool:
