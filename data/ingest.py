@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data.alignment import align
+from data.began import began
 from data.csv.description import TIME_NAMES
 from data.csv.dialect import bare, sniff
 from data.csv.log import elapsed, find_column, read_csv, table_integrity
@@ -49,6 +50,7 @@ class _Logged:
     clock: str
     metadata: Mapping[str, str]
     findings: tuple[Finding, ...]
+    begun: float | None  # from 1970 [s]
 
 
 @dataclass(frozen=True)
@@ -149,6 +151,7 @@ def read_recording(
         resolution=resolution,
         torque_limit=torque_limit,
         axis=axis,
+        begun=logged.begun,
         simulated=logged.metadata.get("simulated", "").strip().lower() == "true",
         sha256=hashlib.sha256(content.data).hexdigest(),
         metadata=logged.metadata,
@@ -218,7 +221,8 @@ def _read_csv(door: _Door, content: ByteArray) -> _Logged:
     findings = integrity.require(door.log, salvage=door.salvage)
     name = layout.headers[columns["time"]] if layout.headers else str(columns["time"])
     clock = f"column {shown(name)!r}"
-    lead = unset_lead(door.convert("time", _interval(time), values.pop("time")))
+    stamps = door.convert("time", _interval(time), values.pop("time"))
+    lead = unset_lead(stamps)
     return _Logged(
         time=door.convert("time", _interval(time), elapsed(table, columns["time"], begin=lead)),
         signals={
@@ -227,6 +231,7 @@ def _read_csv(door: _Door, content: ByteArray) -> _Logged:
         clock=clock,
         metadata=layout.metadata,
         findings=(*findings, *_unset(door, lead, clock)),
+        begun=began(float(stamps[lead]) if stamps.size > lead else 0.0, layout.metadata),
     )
 
 
@@ -309,7 +314,8 @@ def _read_mcap(door: _Door, content: ByteArray) -> _Logged:
         seconds = door.convert("time", time, since_first(topic.ticks[lead:]))
     findings += _unset(door, lead, name)
     signals = {quantity: values[lead:] for quantity, values in signals.items()}
-    logged = _Logged(seconds, signals, name, read.metadata, tuple(findings))
+    begun = began(float(clock[lead]) / 1e9, read.metadata)
+    logged = _Logged(seconds, signals, name, read.metadata, tuple(findings), begun)
     return _after_first(logged)
 
 
