@@ -22,6 +22,7 @@ from compensation.closed_loop import ClosedLoop, simulate
 from compensation.equilibria import equilibrium_set
 from compensation.loop_section import LoopSection
 from compensation.orbits.periodic_orbits import Cycle, find_cycle
+from ident.model.doors import expect
 from ident.model.friction import ModelError
 from ident.model.numbers import is_count, real_array, shown
 from ident.simulation.filippov_system import FloatArray
@@ -109,6 +110,8 @@ def basins(
     map: Map = map,
 ) -> Basins:
     """Where the starts of a rectangle end up, each followed for `duration` [s] at most."""
+    expect("loop", loop, ClosedLoop, "eq 8")
+    expect("starts", starts, Rectangle, "states of eq 8")
     ends = list(map(partial(where_it_settles, loop, duration=duration), iter(starts.starts())))
     known: list[Attractor] = []
     labels = np.full(len(ends), UNDECIDED, np.int64)

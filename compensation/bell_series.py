@@ -31,7 +31,7 @@ from compensation.loop_parameters import (
     fading_difference,
     slip_row,
 )
-from compensation.loop_series import fadings, reach_of
+from compensation.series_reach import fadings, reach_of
 from ident.simulation.compiled import compiled, specialised
 from ident.simulation.filippov_system import FloatArray, Signs
 from ident.simulation.packs import fused, number_of, pack_at, packed, place_pack, spread

@@ -34,6 +34,7 @@ from compensation.rest_pieces import (
     present,
     rest_pieces,
 )
+from ident.model.doors import expect
 from ident.model.friction import ModelError
 from ident.model.numbers import is_one_of, real_array, shown
 from ident.simulation.filippov_system import FloatArray
@@ -91,6 +92,7 @@ def diagram(loop: ClosedLoop, parameter: Parameter, values: ArrayLike) -> Diagra
     ModelError
         If the parameter is unknown, or the values are no ascending finite numbers >= 0.
     """
+    expect("loop", loop, ClosedLoop, "eq 8")
     if not is_one_of(parameter, ("r", "L")):
         raise ModelError(f"parameter is {shown(parameter)}: a diagram is drawn over 'r' or 'L' (eqs 6-7)")
     grid = real_array(values)
@@ -101,11 +103,12 @@ def diagram(loop: ClosedLoop, parameter: Parameter, values: ArrayLike) -> Diagra
         one, other = grid[backwards[0] : backwards[0] + 2]
         raise ModelError(f"values of {parameter} must ascend: {other:g} follows {one:g} (eqs 6-7)")
     with_gain(loop, parameter, float(grid[0]))  # refuses what is no gain
-    chains = cut_at_jumps(loop, parameter, grid, chained(stable_cycles(loop, parameter, grid)))
-    cycles = [_cycle_branch(chain, grid) for chain in chains]
     pieces = rest_pieces(loop, parameter, grid)
     changes = list(_changes_of_equilibria(loop, parameter, grid, pieces))
     births = [change.value for change in changes]
+    found = chained(stable_cycles(loop, parameter, grid))
+    chains = cut_at_jumps(loop, parameter, grid, found, births)
+    cycles = [_cycle_branch(chain, grid) for chain in chains]
     bifurcations = [
         *changes,
         *(Bifurcation(c.value, c.kind) for c in changes_of_cycles(loop, parameter, grid, chains, births)),

@@ -27,7 +27,7 @@ infinite.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Final
 
 import numpy as np
@@ -35,7 +35,8 @@ import numpy as np
 from compensation.controller import Controller
 from compensation.design_criteria import critical_observer_gains, loop_decay
 from compensation.equilibria import DIRECTIONS, Direction, curve_of, equilibrium_set
-from ident.model.friction import StribeckFriction
+from ident.model.doors import expect
+from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
 
 NEEDS_GAIN: Final = "L = 0 1/s: fails, the theorem needs L > 0 (eq 17)"
@@ -55,6 +56,8 @@ class Certificate:
 
 def certificates(robot: OneLinkRobot, controller: Controller, *, law: str) -> tuple[Certificate, ...]:
     """All statements about `robot` under a controller whose model is called `law`."""
+    expect("robot", robot, OneLinkRobot, "eq 1")
+    expect("controller", controller, Controller, "eqs 5-7")
     contraction = _contraction(robot, controller, law)
     exact = _exactness(robot, controller, law)
     error = _error_vanishes(law, contraction, exact)
@@ -124,7 +127,8 @@ def _exactness(robot: OneLinkRobot, controller: Controller, law: str) -> tuple[C
         unit="N m",
         says="e = 0 is a solution if r = 1, as far as the fitted law is the robot's"
         if same
-        else f"the compensator's law differs from the robot's by up to {gap:.4g}: e = 0 is no solution",
+        else f"the compensator's model differs from the robot in {_differing(robot, controller.model)} (dry "
+        f"friction by up to {gap:.4g}): e = 0 is no solution",
     )
     unity = Certificate(
         law=law,
@@ -135,6 +139,19 @@ def _exactness(robot: OneLinkRobot, controller: Controller, law: str) -> tuple[C
         says="the law is compensated in full" if r == 1.0 else f"r = {r}: e = 0 is no solution",
     )
     return own, unity
+
+
+def _differing(robot: OneLinkRobot, model: OneLinkRobot) -> str:
+    """In what two robots that are not the same differ, in words."""
+    pairs = [
+        (getattr(robot.friction, direction), getattr(model.friction, direction)) for direction in DIRECTIONS
+    ]
+    names = [
+        field.name.replace("_", " ")
+        for field in fields(StribeckCurve)
+        if any(getattr(one, field.name) != getattr(other, field.name) for one, other in pairs)
+    ]
+    return ", ".join([*names, *(["inertia"] if robot.inertia != model.inertia else [])])
 
 
 def _error_vanishes(
@@ -262,6 +279,8 @@ def _single_equilibrium(robot: OneLinkRobot, controller: Controller, law: str) -
 
 def law_gap(first: StribeckFriction, second: StribeckFriction) -> float:
     """Largest difference of two laws' dry friction magnitudes [N m], over both directions and all speeds."""
+    expect("first", first, StribeckFriction, "eqs 2-4")
+    expect("second", second, StribeckFriction, "eqs 2-4")
     gaps = [abs(first.positive.coulomb_torque - second.positive.coulomb_torque)]
     gaps.append(abs(first.negative.coulomb_torque - second.negative.coulomb_torque))
     for one, other in ((first.positive, second.positive), (first.negative, second.negative)):

@@ -27,8 +27,9 @@ from numpy.typing import ArrayLike
 from compensation.controller import Controller
 from compensation.loop_runs import EVENT_NAMES, SURFACES, follow, run_for
 from compensation.loop_tables import mode_parameters
+from ident.model.doors import expect
 from ident.model.friction import ModelError
-from ident.model.numbers import is_number, real_array, shown
+from ident.model.numbers import LARGEST, is_number, is_quantity, real_array, shown
 from ident.model.robot import OneLinkRobot
 from ident.simulation.compiled import compiled
 from ident.simulation.filippov_system import FloatArray
@@ -49,10 +50,8 @@ class ClosedLoop:
     controller: Controller
 
     def __post_init__(self) -> None:
-        if not isinstance(self.robot, OneLinkRobot):
-            raise ModelError(f"robot is {self.robot!r}: a OneLinkRobot (eq 1)")
-        if not isinstance(self.controller, Controller):
-            raise ModelError(f"controller is {self.controller!r}: a Controller (eqs 5-6)")
+        expect("robot", self.robot, OneLinkRobot, "eq 1")
+        expect("controller", self.controller, Controller, "eqs 5-6")
 
     @cached_property
     def modes(self) -> FloatArray:
@@ -78,6 +77,7 @@ def simulate(
     ModelError
         If a start, time or tolerance is no number, or times run backwards or out of the duration.
     """
+    expect("loop", loop, ClosedLoop, "eq 8")
     state = _checked_start(start)
     duration, tolerance = checked_accuracy(duration, tolerance)
     if times is None:
@@ -88,7 +88,8 @@ def simulate(
         wanted = checked_times(times, duration)
     states = np.empty((wanted.size, 3))
     end, marks = _run(loop, state, wanted, states, duration, tolerance)
-    states[end.outputs :] = np.nan
+    if end.outputs < wanted.size:
+        states[end.outputs :] = np.nan
     return Trajectory(
         time=wanted,
         state=states,
@@ -105,6 +106,7 @@ def torque(loop: ClosedLoop, states: ArrayLike) -> FloatArray:
     At x2 = 0 the compensation is set-valued; its middle, 0 for a symmetric law, is given. Raises `ModelError`
     for states that are not finite, as after a run that broke off.
     """
+    expect("loop", loop, ClosedLoop, "eq 8")
     found = real_array(states)
     x = None if found is None else np.atleast_2d(found)
     if x is None or x.ndim != 2 or x.shape[1] != 3 or not np.isfinite(x).all():
@@ -152,9 +154,10 @@ def _joined(parts: Sequence[Marks]) -> Marks:
 
 def _checked_start(start: ArrayLike) -> FloatArray:
     state = real_array(start)
-    if state is None or state.shape != (3,) or not all(map(math.isfinite, state.tolist())):
+    if state is None or state.shape != (3,) or not all(map(is_quantity, state.tolist())):
         raise ModelError(
-            f"start is {shown(start)}: three finite numbers x1 [rad], x2 [rad/s], x3 [rad/s] (eq 8)"
+            f"start is {shown(start)}: three finite numbers x1 [rad], x2 [rad/s], x3 [rad/s], "
+            f"up to {LARGEST:g} (eq 8)"
         )
     return state
 

@@ -39,6 +39,7 @@ from scipy.special import wrightomega
 
 from compensation.controller import Controller
 from compensation.equilibria import Direction
+from ident.model.doors import expect
 from ident.model.friction import StribeckCurve
 from ident.model.robot import OneLinkRobot
 
@@ -73,6 +74,8 @@ class Coexistence:
 
 def largest_compensation_with_rest(robot: OneLinkRobot, controller: Controller) -> Coexistence:
     """r_max for the robot under the controller's model and gains; the controller's own r does not count."""
+    expect("robot", robot, OneLinkRobot, "eq 1")
+    expect("controller", controller, Controller, "eqs 5-7")
     return Coexistence(
         positive=_largest_rest(robot, controller, "positive"),
         negative=_largest_rest(robot, controller, "negative"),
@@ -81,6 +84,8 @@ def largest_compensation_with_rest(robot: OneLinkRobot, controller: Controller) 
 
 def largest_compensation(robot: OneLinkRobot, controller: Controller, *, observer_gain: float) -> float:
     """r_max(L) at L = `observer_gain` [1/s]."""
+    expect("robot", robot, OneLinkRobot, "eq 1")
+    expect("controller", controller, Controller, "eqs 5-7")
     gains = replace(controller.gains, observer=observer_gain)
     return largest_compensation_with_rest(robot, replace(controller, gains=gains)).r_max
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 from typing import Final
 
 from ident.model.friction import ModelError
-from ident.model.numbers import is_number, is_one_of, keep_floats, shown
+from ident.model.numbers import LARGEST, is_one_of, is_quantity, keep_floats, shown
 from ident.model.robot import OneLinkRobot
 
 GAIN_OF: Final = {"n1": "proportional", "n2": "derivative", "L": "observer", "r": "compensation"}  # by symbol
@@ -30,8 +30,11 @@ class Gains:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not (is_number(value) and value >= 0):
-                raise ModelError(f"{field.name} gain is {value!r}: a gain is a finite number >= 0 (eqs 5-7)")
+            if not (is_quantity(value) and value >= 0):
+                raise ModelError(
+                    f"{field.name} gain is {shown(value)}: a gain is a finite number >= 0, up to {LARGEST:g} "
+                    "(eqs 5-7)"
+                )
         if self.proportional == 0:
             raise ModelError("proportional gain is 0: n1 > 0, or no position is a set point (eq 5)")
         keep_floats(self, (field.name for field in fields(self)))

@@ -27,6 +27,7 @@ from compensation.cycle_ends import CycleEvent, Neighbourhood, crossing, end_of
 from compensation.cycle_modes import Stick, events_of, mode_sequence, stick_phases
 from compensation.loop_cycles import distance, mirrored
 from compensation.loop_section import LoopSection, with_gain
+from compensation.loop_starts import start_sizes
 from compensation.orbits.continuation import Curve, CurveEvent, Steps, trace
 from compensation.orbits.cycle_equation import JOINED, CycleEquation
 from compensation.orbits.periodic_orbits import Cycle, cycle_at, find_cycle, shoot
@@ -37,7 +38,6 @@ from ident.simulation.filippov_system import FloatArray
 
 Gain = Literal["r", "L", "n1", "n2"]
 
-STARTS: Final = (0.6, -0.6, 0.1, -0.1)  # x1(0) [rad] from which the first cycle is looked for
 VANISHED: Final = 1e-5  # [rad] extent of a cycle that has become a point
 MOST_BRANCHES: Final = 12
 SAME: Final = 1e-3  # relative difference of extremes and period: so near to a known branch, a cycle is on it
@@ -87,7 +87,8 @@ def cycle_branches(
     value = _checked(loop, gain, span)
     section = LoopSection(loop)
     todo: list[tuple[float, Cycle]] = []
-    for x1 in STARTS[: 1 if section.symmetric else None]:
+    far, near = start_sizes(loop, "r", np.array([loop.controller.gains.compensation]))[0].tolist()
+    for x1 in (far, near) if section.symmetric else (far, -far, near, -near):
         cycle = find_cycle(section, np.array([x1, 0.0]))
         if isinstance(cycle, Cycle):
             todo.append((value, cycle))

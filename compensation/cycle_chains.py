@@ -40,8 +40,8 @@ class Chain:
 def chained(found: Sequence[Sequence[Cycle]]) -> list[Chain]:
     """Cycles at consecutive values, joined to branches: the nearest pairs first."""
     chains: list[Chain] = []
+    going_on: list[Chain] = []
     for index, cycles in enumerate(found):
-        going_on = [chain for chain in chains if chain.last == index - 1]
         if len(going_on) == len(cycles) == 1 and cycles[0].returns == going_on[0].cycles[-1].returns:
             going_on[0].cycles.append(cycles[0])  # as nearly always: nothing to compare
             continue
@@ -55,7 +55,9 @@ def chained(found: Sequence[Sequence[Cycle]]) -> list[Chain]:
         for _, number, place in pairs:
             if place in free and going_on[number].last == index - 1:
                 going_on[number].cycles.append(free.pop(place))
-        chains.extend(Chain(index, [cycle]) for cycle in free.values())
+        begun = [Chain(index, [cycle]) for cycle in free.values()]
+        chains.extend(begun)
+        going_on = [chain for chain in (*going_on, *begun) if chain.last == index]
     return chains
 
 

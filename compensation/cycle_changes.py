@@ -22,21 +22,19 @@ from compensation.closed_loop import ClosedLoop
 from compensation.cycle_chains import Chain, parted, suspects
 from compensation.cycle_modes import events_of, mode_sequence, parting
 from compensation.loop_cycles import cycle_near, distance
-from compensation.loop_ends import towards_the_end
+from compensation.loop_ends import LOCATED, CycleAt, WayToEnd, between, fineness, towards_the_end
 from compensation.loop_section import LoopSection, with_gain
 from compensation.loop_tables import Parameter
-from compensation.orbits.periodic_orbits import Cycle
+from compensation.orbits.periodic_orbits import Cycle, is_undecided
 from ident.simulation.filippov_system import FloatArray
 
 HALVINGS: Final = 12  # of an interval that may hold a jump
 STAYED: Final = 0.15  # of the change over the interval, that a jump leaves of it
-LOCATED: Final = 1e-5  # of an interval, to which an end at other cycles or a change of modes is located
-RESOLVED: Final = 4e-16  # relative difference of numbers that can just be told apart
-LOCATED_IN_PASSING: Final = 2.5e-4  # the same of a change between two values of which one has no cycle
 SAME_RETURN: Final = 0.25  # relative step of the section's point, above which it may be another return
-CONTINUOUS: Final = 0.25  # amplitude at an onset, relative to the next point, below which it grows from zero
 READINGS: Final = 32  # values from one reading of the mode sequence to the next
-ONE: Final = 1e-3  # of an interval: so near two changes of a kind are one
+BESIDE_NOTHING: Final = ("limit cycle appears", "limit cycle vanishes")
+SEEN_TWICE: Final = 4.0  # times the accuracy of a change: so near two of a kind are one
+LOSES_STABILITY: Final = 0.9  # of a multiplier: so near to 1 the cycle ends by it, and by no graze
 DOUBLED: Final = 0.01  # relative difference of extremes just beyond a doubling of the period
 ROUNDING: Final = 1e-9  # relative difference of x1_max and -x1_min of mirror images
 
@@ -51,24 +49,36 @@ class Change:
     value: float  # r [-] or L [1/s]
     kind: str
 
+    @property
+    def name(self) -> str:
+        """The kind without how the motion parts there."""
+        return self.kind.partition(":")[0]
+
 
 def cut_at_jumps(
-    loop: ClosedLoop, parameter: Parameter, grid: FloatArray, chains: Sequence[Chain]
+    loop: ClosedLoop,
+    parameter: Parameter,
+    grid: FloatArray,
+    chains: Sequence[Chain],
+    births: Sequence[float] = (),
 ) -> list[Chain]:
-    """The chains, parted where two neighbours in a chain do not continue each other."""
+    """The chains, parted where two neighbours in a chain do not continue each other.
+
+    `births` are values at which cycles may be born: where the equilibria change.
+    """
     whole: list[Chain] = []
     for chain in chains:
         places = list(zip(grid[chain.first : chain.last + 1].tolist(), chain.cycles, strict=True))
-        cuts = [i for i in suspects(chain, grid) if _jumps(loop, parameter, places[i], places[i + 1])]
+        cuts = [i for i in suspects(chain, grid) if _jumps(loop, parameter, places[i], places[i + 1], births)]
         whole.extend(parted(chain, cuts))
     return whole
 
 
-def _jumps(loop: ClosedLoop, parameter: Parameter, low: Place, high: Place) -> bool:
+def _jumps(loop: ClosedLoop, parameter: Parameter, low: Place, high: Place, births: Sequence[float]) -> bool:
     """Whether the change between two cycles happens at once."""
     first = distance(low[1], high[1])
     for _ in range(HALVINGS):
-        middle = 0.5 * (low[0] + high[0])
+        middle = between(low[0], high[0], births)
         found = next(
             (
                 cycle
@@ -99,19 +109,41 @@ def changes_of_cycles(
 
     `births` are values at which cycles may be born: where the equilibria change.
     """
-    known: list[tuple[float, str]] = []
+    ends: list[_End] = []
+    changes: list[Change] = []
     for number, chain in enumerate(chains):
         if any(_are_mirrored(chain, other) for other in chains[:number]):
             continue
-        for change in (
-            *_ends(loop, parameter, grid, chain, chains, births),
-            *_changes_of_modes(loop, parameter, grid, chain),
-        ):
-            name = change.kind.partition(":")[0]
-            near = ONE * float(np.max(np.diff(grid)))
-            if not any(name == other and abs(change.value - value) <= near for value, other in known):
-                known.append((change.value, name))
-                yield change
+        ends.extend(_ends(loop, parameter, grid, chain, chains, births))
+        changes.extend(_changes_of_modes(loop, parameter, grid, chain))
+    changes.extend(end.change for end in ends if not any(_is_told_by(end, other) for other in ends))
+    widest = float(np.max(np.diff(grid), initial=0.0))
+    for index, change in enumerate(changes):
+        near = SEEN_TWICE * fineness(change.value, change.value, widest)
+        if not any(change.name == c.name and abs(change.value - c.value) <= near for c in changes[:index]):
+            yield change
+
+
+@dataclass(frozen=True)
+class _End:
+    """The end of a chain between two values of the grid."""
+
+    change: Change
+    interval: int  # the lower index of the two
+    side: int  # of the chain from there: 1 upwards, -1 downwards
+    returns: int  # of its last cycle
+
+
+def _is_told_by(end: _End, other: _End) -> bool:
+    """Whether an end is the other side of what the end of a chain of fewer returns is called.
+
+    Where both chains reach to each other or beyond, what happens between them is one event, with hysteresis.
+    """
+    if end.interval != other.interval or end.side == other.side or end.change.name != other.change.name:
+        return False
+    gap = end.side * (end.change.value - other.change.value)
+    near = SEEN_TWICE * LOCATED * abs(end.change.value)
+    return gap <= near and (end.returns, end.side) > (other.returns, other.side)
 
 
 def _are_mirrored(one: Chain, other: Chain) -> bool:
@@ -130,7 +162,7 @@ def _ends(
     chain: Chain,
     chains: Sequence[Chain],
     births: Sequence[float],
-) -> Iterator[Change]:
+) -> Iterator[_End]:
     for inner, outer, inwards in ((chain.first, chain.first - 1, 1), (chain.last, chain.last + 1, -1)):
         if not 0 <= outer < grid.size:
             continue
@@ -143,10 +175,13 @@ def _ends(
         if len(chain.cycles) > 1:
             next_one = chain.cycles[inner - chain.first + inwards]
             last = last.after((float(grid[inner + inwards]), next_one))
-        if others:
-            yield _at_others(loop, parameter, last, others)
-        else:
-            yield from _at_nothing(loop, parameter, last, float(grid[outer]), births)
+        changes = (
+            [_at_others(loop, parameter, last, others, births)]
+            if others
+            else _at_nothing(loop, parameter, last, float(grid[outer]), births)
+        )
+        for change in changes:
+            yield _End(change, min(inner, outer), inwards, last.cycle.returns)
 
 
 def _at_nothing(
@@ -154,54 +189,75 @@ def _at_nothing(
 ) -> Iterator[Change]:
     """The end of a chain at a value with no cycles, and how it changes on the way there."""
     way = towards_the_end(loop, parameter, (last.value, outer), last.cycle, births)
-    yield _beside_nothing(last, _Last(way[-1].value, way[-1].cycle), outer)
+    yield _beside_nothing(way, outer)
     begun = last
-    for one, other in pairwise(way):
+    for one, other in pairwise(way.passed):
         if one.cycle.returns != other.cycle.returns:
-            coarse = LOCATED_IN_PASSING * abs(outer - last.value)
-            yield _at_others(loop, parameter, begun, [(other.value, other.cycle)], coarse)
+            change = _at_others(loop, parameter, begun, [(other.value, other.cycle)], births)
+            yield change
+            if change.name.startswith(BESIDE_NOTHING):  # what is beyond the gap ends here, too
+                beyond = _Last(other.value, other.cycle)
+                yield _at_others(loop, parameter, beyond, [(one.value, one.cycle)], births)
         begun = _Last(other.value, other.cycle).after((one.value, one.cycle))
 
 
 def _at_others(
-    loop: ClosedLoop, parameter: Parameter, last: _Last, others: Sequence[Place], coarse: float = 0.0
+    loop: ClosedLoop, parameter: Parameter, last: _Last, others: Sequence[Place], births: Sequence[float]
 ) -> Change:
-    """The end of a chain at a value with others, located to `coarse` or better.
+    """The end of a chain at a value with others.
 
     A cycle found in between is on the chain if it takes as many returns and is nearer to the chain's trend
-    than to the others.
+    than to the others. From far off the motion may miss a chain that goes on: the end is one only if from
+    right beside it there is no going on either.
     """
-    begun, known = last, list(others)
-    bad = known[0][0]
-    fine = max(_fine(last.value, bad), coarse)
-    beyond: Place | None = min(known, key=lambda other: distance(other[1], last.cycle))
-    while abs(bad - last.value) > fine:
-        middle = 0.5 * (last.value + bad)
-        found = cycle_near(loop, parameter, middle, last.guess(middle))
+    limit = bad = others[0][0]
+    width = abs(limit - last.value)
+    way, known = [last], list(others)
+    beyond: list[Place | None] = [min(known, key=lambda other: distance(other[1], last.cycle))]
+
+    def inside(value: float) -> bool:
+        return min(last.value, limit) < value < max(last.value, limit)
+
+    def goes_on(value: float) -> bool:
+        found = cycle_near(loop, parameter, value, way[-1].guess(value))
         if not isinstance(found, Cycle) or not found.stable:
-            bad, beyond = middle, None
+            goes_elsewhere = isinstance(found, Cycle) or is_undecided(found)
+            beyond.append(min(known, key=lambda other: abs(other[0] - value)) if goes_elsewhere else None)
+            return False
+        off, alike = way[-1].off_trend(value, found), found.returns == last.cycle.returns
+        if not alike or any(c.returns == found.returns and distance(found, c) < off for _, c in known):
+            known.append((value, found))
+            beyond.append(known[-1])
+            return False
+        way.append(_Last(value, found).after((way[-1].value, way[-1].cycle)))
+        return True
+
+    while True:
+        here = way[-1].value
+        if abs(bad - here) > fineness(bad, here, width):
+            value = between(here, bad, births)
+            if not goes_on(value):
+                bad = value
             continue
-        off = last.off_trend(middle, found)
-        if found.returns != last.cycle.returns or any(distance(found, other) < off for _, other in known):
-            bad, beyond = middle, (middle, found)
-            known.append(beyond)
-        else:
-            last = _Last(middle, found).after((last.value, last.cycle))
-    if beyond is None:
-        return _beside_nothing(begun, last, bad)
-    return Change(last.value, _name(loop, parameter, (last.value, last.cycle), beyond))
+        step = 2.0 * (bad - here)
+        if not (inside(here + step) and goes_on(here + step)):
+            break
+        while inside(way[-1].value + 2.0 * step) and goes_on(way[-1].value + 2.0 * step):
+            step *= 2.0
+        bad = way[-1].value + 2.0 * step
+        if not inside(bad):
+            bad = limit
+    end = way[-1]
+    if beyond[-1] is None:
+        passed = [CycleAt(last.value, last.cycle), CycleAt(end.value, end.cycle)]
+        return _beside_nothing(WayToEnd(passed, end.value), bad)
+    return Change(end.value, _name(loop, parameter, (end.value, end.cycle), beyond[-1]))
 
 
-def _fine(one: float, other: float) -> float:
-    """How closely a change between two values is located; numbers have an end."""
-    return max(LOCATED * abs(one - other), RESOLVED * max(abs(one), abs(other)))
-
-
-def _beside_nothing(last: _Last, end: _Last, outer: float) -> Change:
-    """The name of an end beyond which the motion finds no cycle, refined from the `last` value of a chain."""
-    word = "appears" if outer < end.value else "vanishes"
-    small = end.cycle.amplitude < CONTINUOUS * last.cycle.amplitude
-    return Change(end.value, f"limit cycle {word}, {'from zero amplitude' if small else 'with a jump'}")
+def _beside_nothing(way: WayToEnd, outer: float) -> Change:
+    """The name of an end beyond which the motion finds no cycle."""
+    what = BESIDE_NOTHING[0 if outer < way.passed[0].value else 1]
+    return Change(way.end, f"{what}, {'from zero amplitude' if way.shrinks else 'with a jump'}")
 
 
 @dataclass(frozen=True)
@@ -243,19 +299,18 @@ def _name(loop: ClosedLoop, parameter: Parameter, last: Place, beyond: Place) ->
     (value, cycle), (at, other) = last, beyond
     fewer, more = sorted((cycle.returns, other.returns))
     name = "limit cycle jumps"
-    if _is_symmetric(cycle) != _is_symmetric(other):
+    even = LoopSection(loop).symmetric
+    if even and fewer % 2 != more % 2:  # an odd number of half turns makes a symmetric cycle
         name = "symmetry breaking"
     elif more == 2 * fewer and distance(replace(cycle, period=other.period), other) < DOUBLED:
         name = "period doubling"
+    if abs(cycle.multipliers[0]) > LOSES_STABILITY:
+        return name
     here, there = (
         events_of(with_gain(loop, parameter, gain), cycle.point, cycle.period) for gain in (value, at)
     )
     graze = parting(here, there, cycle.period)
     return name if graze is None else f"{name}: {graze}"
-
-
-def _is_symmetric(cycle: Cycle) -> bool:
-    return abs(cycle.x1_min + cycle.x1_max) <= ROUNDING * cycle.amplitude
 
 
 def _changes_of_modes(
@@ -285,8 +340,8 @@ def _changes_of_modes(
 
 def _change_of_modes(loop: ClosedLoop, parameter: Parameter, low: Place, high: Place) -> Change:
     first, last = (_modes(loop, parameter, place) for place in (low, high))
-    fine = _fine(low[0], high[0])
-    while high[0] - low[0] > fine:
+    width = high[0] - low[0]
+    while high[0] - low[0] > fineness(low[0], high[0], width):
         middle = 0.5 * (low[0] + high[0])
         found = cycle_near(loop, parameter, middle, low[1])
         if not isinstance(found, Cycle):

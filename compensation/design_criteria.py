@@ -32,6 +32,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from compensation.controller import Controller
+from ident.model.doors import expect
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.numbers import is_number, real_array, shown
 from ident.model.robot import OneLinkRobot
@@ -52,6 +53,7 @@ class CriticalGains:
 
 def critical_observer_gain(curve: StribeckCurve, *, inertia: float) -> float:
     """L_c [1/s] of one curve on an inertia [kg m^2], eqs (11)-(13). `ModelError` for what is no inertia."""
+    expect("curve", curve, StribeckCurve, "eq 3")
     if not (is_number(inertia) and inertia > 0):
         raise ModelError(f"inertia is {inertia!r} kg m^2: a finite J > 0 (eq 11)")
     return (curve.steepest_fall - curve.viscous_damping) / inertia
@@ -59,6 +61,7 @@ def critical_observer_gain(curve: StribeckCurve, *, inertia: float) -> float:
 
 def critical_observer_gains(robot: OneLinkRobot) -> CriticalGains:
     """The critical gains of the robot itself, whatever its compensator believes."""
+    expect("robot", robot, OneLinkRobot, "eq 1")
     friction, inertia = robot.friction, robot.inertia
     positive = critical_observer_gain(friction.positive, inertia=inertia)
     negative = critical_observer_gain(friction.negative, inertia=inertia)
@@ -68,6 +71,7 @@ def critical_observer_gains(robot: OneLinkRobot) -> CriticalGains:
 
 def sector_constant(friction: StribeckFriction) -> float:
     """lambda [N m s/rad] of eq (12), the least slope of the law away from 0, over both directions; <= 0."""
+    expect("friction", friction, StribeckFriction, "eqs 2-4")
     return -max(friction.positive.steepest_fall, friction.negative.steepest_fall)
 
 
@@ -77,6 +81,7 @@ def sector_slack(friction: StribeckFriction, x2: ArrayLike, x3: ArrayLike) -> ND
     x2, x3 [rad/s] of any common shape. Where the law is set-valued, its worst values are taken. Raises
     `ModelError` for what is no velocity, or shapes that do not fit.
     """
+    expect("friction", friction, StribeckFriction, "eqs 2-4")
     estimate, error = _velocities("x2", x2), _velocities("x3", x3)
     try:
         np.broadcast_shapes(estimate.shape, error.shape)
@@ -103,6 +108,7 @@ def observer_error_decay(robot: OneLinkRobot, observer_gain: float) -> float:
     Errors of two solutions under the same x2(t) approach each other at this rate. Negative: while the link
     creeps in the worse direction, errors grow. Raises `ModelError` unless L > 0, which eq (17) needs.
     """
+    expect("robot", robot, OneLinkRobot, "eq 1")
     if not (is_number(observer_gain) and observer_gain > 0):
         raise ModelError(f"observer_gain is {observer_gain!r} 1/s: a finite L > 0 (eq 17)")
     return observer_gain - critical_observer_gains(robot).worst
@@ -124,6 +130,7 @@ def loop_decay(controller: Controller) -> LoopDecay:
     lasts pi/w+ and x2 < 0 pi/w-, and the rate is the average over a turn. A direction with real eigenvalues
     is never left again: its slower one is the rate (the slower of both, if both are real).
     """
+    expect("controller", controller, Controller, "eqs 5-7")
     friction = controller.model.friction
     pairs = [_eigenvalues(controller, friction.positive), _eigenvalues(controller, friction.negative)]
     monotone = [-max(pair[0].real, pair[1].real) for pair in pairs if pair[0].imag == 0.0]
@@ -138,7 +145,7 @@ def loop_decay(controller: Controller) -> LoopDecay:
 def _eigenvalues(controller: Controller, curve: StribeckCurve) -> tuple[complex, complex]:
     gains, inertia = controller.gains, controller.model.inertia
     half = 0.5 * (curve.viscous_damping + gains.derivative) / inertia
-    root = cmath.sqrt(half**2 - gains.proportional / inertia)
+    root = cmath.sqrt(half * half - gains.proportional / inertia)
     if root.imag == 0.0:  # product of the roots, so that the slow one does not cancel
         fast = -half - root.real
         return complex(gains.proportional / inertia / fast), complex(fast)

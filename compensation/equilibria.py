@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike
 
 from compensation.controller import Controller, with_gain
 from compensation.torque_balance import TorqueBalance
+from ident.model.doors import expect
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.numbers import is_number, is_one_of, real_array, shown
 from ident.model.robot import OneLinkRobot
@@ -96,6 +97,8 @@ class EquilibriumSet:
 
 def equilibrium_set(robot: OneLinkRobot, controller: Controller) -> EquilibriumSet:
     """Every equilibrium of the robot under the controller, eqs (9)-(10)."""
+    expect("robot", robot, OneLinkRobot, "eq 1")
+    expect("controller", controller, Controller, "eqs 5-7")
     segments = [
         _segment(controller, direction, low, high)
         for direction in DIRECTIONS

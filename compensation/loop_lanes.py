@@ -27,7 +27,7 @@ from compensation.loop_parameters import (
     WIDTHV,
     slip_row,
 )
-from compensation.loop_series import reach_of
+from compensation.series_reach import reach_of
 from ident.simulation.compiled import compiled, passed, specialised
 from ident.simulation.filippov_system import FloatArray, Signs
 from ident.simulation.lanes import LANES, LaneSystem

@@ -29,7 +29,6 @@ from typing import Final
 
 import numpy as np
 
-from compensation.bell_series import bell_series
 from compensation.loop_parameters import (
     A1,
     A2,
@@ -170,24 +169,8 @@ def slide_at(signs: Signs, state: FloatArray, parameters: FloatArray, time: floa
     out[2] = -out[1]
 
 
-@compiled
-def mode_series(
-    signs: Signs,
-    state: FloatArray,
-    parameters: FloatArray,
-    order: int,
-    coefficients: FloatArray,
-    work: FloatArray,
-) -> float:
-    """Taylor coefficients in a slip mode whose shapes are 1 or 2: `FilippovSystem.series`."""
-    mode = slip_row(signs)
-    if parameters[mode, SHAPE2] == 1.0 and parameters[mode, SHAPEV] == 1.0:
-        return series(signs, state, parameters, order, coefficients, work)
-    return bell_series(signs, state, parameters, order, coefficients, work)
-
-
 SYSTEM: Final = FilippovSystem(
-    field=passed(field), series=passed(mode_series), slide=passed(slide), slide_at=passed(slide_at)
+    field=passed(field), series=passed(series), slide=passed(slide), slide_at=passed(slide_at)
 )
 SURFACE_ROWS: Final = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 1.0, 1.0, 0.0]])
 SURFACE_PIVOTS: Final = np.array([1, 2])

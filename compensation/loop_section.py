@@ -14,7 +14,9 @@ from compensation.closed_loop import ClosedLoop
 from compensation.loop_returns import MOST_HALTS, carry_for, derivative, returns
 from compensation.loop_runs import is_analytic, run_for, smallest_shape
 from compensation.orbits.periodic_orbits import Returns
-from ident.model.friction import StribeckFriction
+from ident.model.doors import expect
+from ident.model.friction import ModelError, StribeckFriction
+from ident.model.numbers import is_count, real_array, shown
 from ident.model.robot import OneLinkRobot
 from ident.simulation.filippov_system import FloatArray
 from ident.simulation.integrate import END_REASONS, EQUILIBRIUM, SECTION
@@ -31,6 +33,9 @@ class LoopSection:
     """The section v = 0 of a closed loop. Points are (x1 [rad], x2 [rad/s]) where the link halts."""
 
     loop: ClosedLoop
+
+    def __post_init__(self) -> None:
+        expect("loop", self.loop, ClosedLoop, "eq 8")
 
     @cached_property
     def symmetric(self) -> bool:
@@ -66,8 +71,16 @@ class LoopSection:
         return smallest_shape(self._parameters) >= 1.0
 
     def follow(self, point: FloatArray, returns: int) -> Returns:
-        """The next returns after a point (2,) of the section."""
-        return self.follow_state(_state(point), returns)
+        """The next returns after a point (2,) of the section.
+
+        Raises `ModelError` for what is no point, or no count >= 1.
+        """
+        found = real_array(point)
+        if found is None or found.shape != (2,) or not np.isfinite(found).all():
+            raise ModelError(f"point is {shown(point)}: two finite numbers x1 [rad], x2 [rad/s] (eq 8)")
+        if not (is_count(returns) and returns >= 1):
+            raise ModelError(f"returns are {shown(returns)}: a whole number >= 1 (eq 8)")
+        return self.follow_state(_state(found), int(returns))
 
     def follow_state(self, state: FloatArray, count: int) -> Returns:
         """The next returns after any state (3,)."""

@@ -22,6 +22,7 @@ from __future__ import annotations
 from math import exp, inf
 from typing import Any, Final
 
+from compensation.bell_series import bell_series
 from compensation.loop_parameters import (
     A1,
     A2,
@@ -33,6 +34,8 @@ from compensation.loop_parameters import (
     K0,
     K2,
     KV,
+    SHAPE2,
+    SHAPEV,
     SIGN2,
     SIGNV,
     WIDTH2,
@@ -40,26 +43,10 @@ from compensation.loop_parameters import (
     fading_difference,
     slip_row,
 )
+from compensation.series_reach import fadings, reach_of
 from ident.simulation.compiled import compiled, passed, specialised, unrolled
 from ident.simulation.filippov_system import FloatArray, Signs
-from ident.simulation.pack_functions import rough_power_of_two
-from ident.simulation.packs import (
-    fused,
-    larger,
-    magnitude,
-    number_of,
-    pack_at,
-    packed,
-    place_pack,
-    rough_log2,
-    smaller,
-    spread,
-)
-from ident.simulation.taylor import SMALLEST
-
-UNSEEN: Final = 40.0  # exp(-40) is below rounding
-UNLIMITED: Final = 1e300
-LONGEST: Final = 1000.0  # of a reach, as a power of two
+from ident.simulation.packs import fused, number_of, pack_at, packed, place_pack, spread
 
 
 @compiled
@@ -73,11 +60,15 @@ def series(
 ) -> float:
     """Taylor coefficients of the state into rows 0..2 of `coefficients`; `order` is a literal.
 
+    A mode with a bell is left to `bell_series`: here, as a function between the two costs time at every step.
+
     `work` keeps those of the slopes, 4 numbers each, and from `fadings(order)` on those of the fadings.
     Returns for how long the series hold: at many times v_s, E is lost in rounding, yet is back before v is
     small.
     """
     mode = slip_row(signs)
+    if parameters[mode, SHAPE2] != 1.0 or parameters[mode, SHAPEV] != 1.0:
+        return float(bell_series(signs, state, parameters, order, coefficients, work))
     a1, a2, a3 = parameters[mode, A1], parameters[mode, A2], parameters[mode, A3]
     c1, c2, gain = parameters[mode, C1], parameters[mode, C2], parameters[mode, GAIN]
     k2, kv, shared = parameters[mode, K2], parameters[mode, KV], parameters[mode, ALIKE]
@@ -119,8 +110,7 @@ def series(
         for k in range(1, order + 1):
             x2, v = coefficients[1, k], coefficients[1, k] + coefficients[2, k]
             place_pack(work, 4 * k, packed(rate2 * x2, ratev * v, 0.0, 0.0))
-        reach: float = reach_of(work, 0, order, fall2, fallv)
-        return reach
+        return float(reach_of(work, 0, order, fall2, fallv))
     return inf
 
 
@@ -156,31 +146,3 @@ def _next_order(i: int, carried: Any, given: Any) -> Any:
 
 
 NEXT_ORDER: Final = passed(_next_order)
-
-
-@compiled
-def fadings(order: int) -> int:
-    """Where in `work` the coefficients of the fadings begin."""
-    return 4 * (order + 1)
-
-
-@compiled
-def reach_of(exponents: FloatArray, at: int, order: int, fall2: float, fallv: float) -> float:
-    """Time within which neither exponent falls by more than `order`, nor from above to below UNSEEN.
-
-    Of the exponents' Taylor coefficients, that begin with `fall2` and `fallv`, those of degree k stand at
-    `at` + 4 k, two of every 4 numbers.
-    """
-    allowed = packed(_allowed(fall2, order), _allowed(fallv, order), UNLIMITED, UNLIMITED)
-    power = spread(4, LONGEST)
-    for k in range(1, order + 1):
-        change = larger(magnitude(pack_at(4, exponents, at + 4 * k)), spread(4, SMALLEST))
-        power = smaller(rough_log2(allowed / change) * spread(4, 1.0 / k), power)
-    reach = rough_power_of_two(power)
-    nearest: float = min(number_of(reach, 0), number_of(reach, 1))
-    return 0.5 * nearest
-
-
-@compiled
-def _allowed(fall: float, order: int) -> float:
-    return max(float(order), fall - UNSEEN) if fall > order else UNLIMITED

@@ -26,6 +26,7 @@ from compensation.loop_sweep import CLOSE, TANGENT_TOLERANCE
 from compensation.loop_tables import COLUMN_OF, Parameter, gain_row, laws_of
 from compensation.orbits.periodic_orbits import (
     MOST_TURNS,
+    SAME_POINT,
     VANISHED,
     Cycle,
     NoCycle,
@@ -121,10 +122,16 @@ def _complete(
     count: int,
     row: FloatArray,
 ) -> int:
-    """The `row` of a cycle of `count` returns from a point near it: their number, or as for `settle`."""
+    """The `row` of a cycle of `count` returns from a point near it: their number, or as for `settle`.
+
+    Motion that closes in from alternate sides comes near after two returns before it does after one: the
+    count is lowered where the cycle, once corrected, turns out to take fewer.
+    """
     for _ in range(MOST_CORRECTIONS):
         found, changed = _period(kernels, table, symmetric, tolerance, patience, count, row)
-        if found != count or changed <= REPEATS:
+        if 0 < found < count:
+            count = found
+        elif found != count or changed <= REPEATS:
             return found
     return UNDECIDED
 
@@ -139,12 +146,16 @@ def _period(
     count: int,
     row: FloatArray,
 ) -> tuple[int, float]:
-    """As `_complete`, from one period, and by how much that corrects the point, relative to its size."""
+    """As `_complete`, from one period, and by how much that corrects the point, relative to its size.
+
+    The number is smaller than `count` where the point came back sooner; the row is then unchanged.
+    """
     state, slope = np.empty(3), np.zeros((3, 2))
     state[0], state[1], state[2] = row[X1], row[X2], -row[X2]
     slope[0, 0] = slope[1, 1] = 1.0
     low, high, extent, duration, side = np.inf, -np.inf, 0.0, 0.0, 1.0
-    for _ in range(count):
+    same = SAME_POINT * max(abs(row[X1]), abs(row[X2]))
+    for made in range(1, count + 1):
         spent, lowest, highest = _turn(kernels, table, symmetric, tolerance, patience, state, slope)
         if not spent < np.inf:
             return UNDECIDED, np.inf
@@ -153,6 +164,8 @@ def _period(
         low, high = min(low, side * lowest, side * highest), max(high, side * lowest, side * highest)
         if symmetric:
             side = -side
+        if made < count and _apart(state, row) <= same:
+            return made, np.inf
     if extent <= STILL * max(-low, high):
         return NOWHERE, 0.0
     change1, change2 = newton_change(slope, state[0] - row[X1], state[1] - row[X2])

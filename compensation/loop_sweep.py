@@ -48,9 +48,10 @@ def sweep(
     rows: FloatArray,
     verdicts: Signs,
 ) -> None:
-    """The cycle at each of n ascending values, from those before or else from `cold` (2,): rows (n, COLUMNS).
+    """The cycle at each of n ascending values, from those before or else from `cold`: rows (n, COLUMNS).
 
-    The first value starts from `first` (2,). `kernels` are those of the loop.
+    The first value starts from `first` (2,), others without a cycle before them from the starts x1 [rad] of
+    `cold` (n, 2), the far one first. `kernels` are those of the loop.
 
     `tables` (n, 6, 16) are the parameters of `loop_parameters` at the `values` (n,) of a gain; verdicts (n,)
     are those named above. The sweep ends at the first value that stays undecided.
@@ -65,11 +66,14 @@ def sweep(
         if known > 0:
             extrapolate(values, rows, value, known, memory, guess)
         elif value > 0:
-            assign(guess, cold)
+            guess[0], guess[1] = cold[value, 0], 0.0
         row = rows[value]
         verdict, missed = cycle_from(kernels, tables[value], tolerance, patience, guess, missed <= CLOSE, row)
         if verdict == LEADS_ELSEWHERE and known > 0:
             assign(guess, rows[value - 1, :2])  # the branch may bend more than its guess
+            verdict, missed = cycle_from(kernels, tables[value], tolerance, patience, guess, False, row)
+        if verdict == LEADS_ELSEWHERE:
+            guess[0], guess[1] = cold[value, 1], 0.0
             verdict, missed = cycle_from(kernels, tables[value], tolerance, patience, guess, False, row)
         verdicts[value] = verdict
         if verdict == UNDECIDED:

@@ -34,7 +34,7 @@ from compensation.loop_parameters import (
     WIDTHV,
     slip_row,
 )
-from compensation.loop_series import fadings
+from compensation.series_reach import fadings
 from ident.simulation.compiled import compiled, passed, specialised
 from ident.simulation.filippov_system import FilippovSystem, FloatArray, Signs, no_slide, no_slide_at
 from ident.simulation.packs import fused, number_of, pack_at, packed, place_pack, spread

@@ -24,6 +24,7 @@ from compensation.loop_modes import surfaces
 from compensation.loop_parameters import COLUMNS
 from compensation.loop_runs import begin, is_exponential, run_at, run_for
 from compensation.loop_tables import GAIN_NAMES, gain_row, tables_over_gains
+from ident.model.doors import expect
 from ident.model.friction import ModelError
 from ident.model.numbers import is_count, real_array, shown
 from ident.simulation.compiled import compiled, owning, passed
@@ -80,6 +81,7 @@ def simulate_many(
         If starts, gains, times, tolerance or parts are no numbers, have no fitting shape or run backwards; it
         names the trajectory and the gain.
     """
+    expect("loop", loop, ClosedLoop, "eq 8")
     first = _checked_starts(starts)
     rows = gain_row(loop.controller)[np.newaxis] if gains is None else _checked_gains(gains, first.shape[0])
     duration, tolerance = checked_accuracy(duration, tolerance)

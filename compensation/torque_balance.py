@@ -30,6 +30,8 @@ from itertools import pairwise
 from scipy.optimize import brentq
 
 from compensation.lambert_roots import lambert_roots
+from ident.model.friction import ModelError
+from ident.model.numbers import is_number_or_inf, shown
 
 Interval = tuple[float, float]  # ends of a range of s [rad/s]; the upper may be infinite
 _FAR = 1e60  # s/v_s beyond which everything has faded, for any shape; keeps the power finite
@@ -47,6 +49,11 @@ class TorqueBalance:
 
     def excess(self, speed: float) -> float:
         """h(s) [N m] at s > 0 [rad/s]: the applied torque beyond the robot's static friction."""
+        if not (is_number_or_inf(speed) and speed >= 0.0):
+            raise ModelError(f"speed is {shown(speed)}: s >= 0 [rad/s] (eqs 9-10)")
+        return self._excess(speed)
+
+    def _excess(self, speed: float) -> float:
         ratio = min(speed / self.stribeck_velocity, _FAR)
         faded = math.expm1(-(ratio**self.stribeck_shape))
         return self.slope * speed + (self.onset + self.fading * faded)
@@ -65,7 +72,7 @@ class TorqueBalance:
         crossings = [0.0, *self._roots()]
         ranges = []
         for low, high in pairwise(crossings):
-            if high > low and self.excess(0.5 * (low + high)) < 0.0:
+            if high > low and self._excess(0.5 * (low + high)) < 0.0:
                 ranges.append((low, high))
         return tuple(ranges)
 
@@ -88,7 +95,7 @@ class TorqueBalance:
         pieces = [0.0, *(s for s in self._stationary_speeds() if s < end), end]
         found = [self._root_between(low, high) for low, high in pairwise(pieces)]
         roots = [root for root in found if root is not None]
-        if self.excess(end) <= 0.0 and (not roots or roots[-1] < end):  # all fading is below rounding at c/a
+        if self._excess(end) <= 0.0 and (not roots or roots[-1] < end):  # all fading is below rounding at c/a
             roots.append(end)
         return roots
 
@@ -99,13 +106,13 @@ class TorqueBalance:
 
     def _root_between(self, low: float, high: float) -> float | None:
         """The root of h in a piece where h is monotone, or None."""
-        at_low = self.excess(low) if low > 0.0 else self.onset
-        at_high = self.excess(high)
+        at_low = self._excess(low) if low > 0.0 else self.onset
+        at_high = self._excess(high)
         if at_high == 0.0:
             return high
         if at_low * at_high >= 0.0:  # a piece that begins in a root holds no other
             return None
-        return _bracketed(self.excess, low, high)
+        return _bracketed(self._excess, low, high)
 
     def _stationary_speeds(self) -> list[float]:
         """The speeds where h' = 0, rising, for beta != 1.

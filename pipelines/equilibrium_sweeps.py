@@ -16,12 +16,20 @@ from pipelines.results.folder import ResultFolder
 
 FIGURE_8_GAINS: Final = (0.9, 0.95, 0.99, 1.0, 1.005, 1.01, 1.02)  # r; the paper does not print its own
 _POINTS: Final = 481
+_FAR_APART: Final = 20.0  # ratio of marks that no even axis shows together
+_FAR_BELOW: Final = 0.02
 _NEAR_FOLD: Final = (0.0, 1e-5, 1e-4, 5e-4, 1e-3, 2e-3)  # relative distances below the end of a set
 
 
 def observer_gain_axis(*marks: float) -> FloatArray:
-    """Observer gains (n,) [1/s] from near 0 to well past every finite one of `marks`."""
-    end = 1.4 * max((mark for mark in marks if np.isfinite(mark) and mark > 0), default=100.0)
+    """Observer gains (n,) [1/s] from near 0 to well past every finite one of `marks`.
+
+    Evenly spaced; by ratios from far below the least mark where the marks lie orders of magnitude apart.
+    """
+    finite = [mark for mark in marks if np.isfinite(mark) and mark > 0] or [100.0]
+    end = 1.4 * max(finite)
+    if max(finite) > _FAR_APART * min(finite):
+        return np.geomspace(_FAR_BELOW * min(finite), end, _POINTS)
     return np.linspace(end / (_POINTS - 1), end, _POINTS)
 
 

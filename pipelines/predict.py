@@ -9,7 +9,6 @@ of the inclusion.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, Literal
@@ -22,6 +21,7 @@ from compensation.controller import Controller
 from compensation.sampled_bifurcation import sampled_cycles
 from compensation.sampled_loop import Map, Sampling
 from data.recording import Axis, FloatArray
+from ident.model.numbers import LARGEST
 from ident.model.robot import OneLinkRobot
 from pipelines.exit_status import UsageError
 from pipelines.progress import Progress, Silent
@@ -61,8 +61,8 @@ def parse_sweep(text: str) -> Sweep:
         start, stop, points = float(parts[0]), float(parts[1]), int(parts[2])
     except ValueError:
         raise UsageError(rule) from None
-    if not (math.isfinite(start) and math.isfinite(stop) and 0.0 <= start < stop):
-        raise UsageError(f"{rule}; START must be >= 0 and below STOP, both finite")
+    if not 0.0 <= start < stop <= LARGEST:
+        raise UsageError(f"{rule}; START must be >= 0 and below STOP, both finite, up to {LARGEST:g}")
     if not 2 <= points <= MOST_POINTS:
         raise UsageError(f"{rule}; POINTS must be from 2 to {MOST_POINTS}")
     return Sweep("r" if name == "r" else "L", np.linspace(start, stop, points))

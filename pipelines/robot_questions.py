@@ -10,6 +10,7 @@ from pathlib import Path
 from compensation.controller import Controller
 from compensation.sampled_loop import Sampling
 from data.recording import Axis
+from ident.model.numbers import LARGEST
 from pipelines.executors.threads import opened_threads
 from pipelines.exit_status import Status, UsageError
 from pipelines.predict import Sweep, predict, write_prediction
@@ -32,7 +33,13 @@ def counted_resolution(source: RobotFile, encoder_counts: float | None) -> float
         return None
     if not 0 < encoder_counts < float("inf"):
         raise UsageError(f"--encoder-counts is {encoder_counts:g}: give counts a revolution, > 0")
-    return resolution_of(encoder_counts, axis_of(source))
+    resolution = resolution_of(encoder_counts, axis_of(source))
+    if resolution > LARGEST:
+        raise UsageError(
+            f"--encoder-counts is {encoder_counts:g}: one count would be {resolution:.4g} rad (m on a linear "
+            "axis); give counts a revolution (a metre)"
+        )
+    return resolution
 
 
 def predict_robot(

@@ -24,6 +24,7 @@ from compensation.controller import Controller
 from compensation.sampled_loop import Sampling, run_sampled
 from data.mcap.writer import write_mcap
 from data.recording import Axis, FloatArray
+from ident.model.numbers import LARGEST, is_quantity
 from ident.model.robot import OneLinkRobot
 from ident.response import respond
 from pipelines.exit_status import RefusalError, UsageError
@@ -34,7 +35,6 @@ FORMATS: Final[tuple[Format, ...]] = get_args(Format)
 HEADER: Final = ("t", "x1", "x2", "x3", "v", "u")
 OUTPUT_STEP: Final = 1e-3  # [s] between the rows of a continuous run
 MOST_ROWS: Final = 200_000  # of a continuous run
-DECAYED: Final = 1e-150  # of the start: what has become as small is 0 in every sense
 MOST_TURNS: Final = 1e4  # that a continuous run may take before its gains are to blame
 MOST_SAMPLES: Final = 5_000_000  # of a sampled run
 _START_WORDS: Final = 3
@@ -63,8 +63,10 @@ def parse_start(text: str) -> tuple[float, float, float]:
         values = [float(word) for word in words]
     except ValueError:
         values = []
-    if len(values) != _START_WORDS or not all(map(math.isfinite, values)):
-        raise UsageError(f"--x0 is {text!r}: give three finite numbers, x1,x2,x3 [rad, rad/s, rad/s]")
+    if len(values) != _START_WORDS or not all(map(is_quantity, values)):
+        raise UsageError(
+            f"--x0 is {text!r}: give three finite numbers up to {LARGEST:g}, x1,x2,x3 [rad, rad/s, rad/s]"
+        )
     return values[0], values[1], values[2]
 
 
@@ -123,15 +125,6 @@ def _continuous(
     loop = ClosedLoop(robot, controller)
     found = simulate(loop, start, times=np.linspace(0.0, duration, rows), duration=duration)
     missing = ~np.isfinite(found.state).all(axis=1)
-    if missing.any() and np.max(np.abs(found.end_state)) <= DECAYED * max(map(abs, start)):
-        found.state[missing] = 0.0
-        return SimulatedRun(
-            time=found.time,
-            state=found.state,
-            torque=torque(loop, found.state),
-            loop="continuous: inclusion (8)",
-            end=f"decayed to the set point, below the smallest numbers, after {found.end_time:.4g} s",
-        )
     if missing.any():
         raise RefusalError(
             f"the run stopped at t = {found.end_time:.6g} s of {duration:g} s ({found.end_reason}): nothing "

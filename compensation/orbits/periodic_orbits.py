@@ -15,6 +15,7 @@ always 1, along the cycle, is not among them. The cycle is stable where all lie 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -31,6 +32,7 @@ NEWTON_STEPS: Final = 12
 SAME_POINT: Final = 1e-7  # relative distance of points of a converged cycle that are one
 VANISHED: Final = 1e-9  # of the start: what has become as small decays
 NEAR: Final = 1e-3  # relative distance from which shooting is tried
+UNREPEATED: Final = "no repetition within"
 NO_DERIVATIVE: Final = "the return has no derivative that leads on"
 
 
@@ -88,6 +90,11 @@ class NoCycle:
     end_reason: str
 
 
+def is_undecided(found: Cycle | NoCycle) -> bool:
+    """Whether the motion neither repeats nor comes to rest as far as it was followed."""
+    return isinstance(found, NoCycle) and found.end_reason.startswith(UNREPEATED)
+
+
 def find_cycle(section: ReturnMap, start: FloatArray) -> Cycle | NoCycle:
     """The cycle that a point (d,) of the section leads to."""
     done = section.follow(start, FIRST_LOOK)
@@ -101,7 +108,7 @@ def find_cycle(section: ReturnMap, start: FloatArray) -> Cycle | NoCycle:
         if float(np.max(np.abs(points[-1]))) <= VANISHED * float(np.max(np.abs(start))):
             return NoCycle("decays to a point")
         if points.shape[0] >= PATIENCE:
-            return NoCycle(f"no repetition within {points.shape[0]} returns")
+            return NoCycle(f"{UNREPEATED} {points.shape[0]} returns")
         returns = _repeats(points, NEAR)
         if returns and points.shape[0] >= SHOOTING:
             shot = shoot(section, points[-1], returns)
@@ -166,7 +173,7 @@ def cycle_of(
         duration, slope = 2.0 * duration, slope @ slope
         high = max(high, -low)
         low = -high
-    multipliers = sorted((complex(value) for value in np.linalg.eigvals(slope)), key=abs, reverse=True)
+    multipliers = sorted(_eigenvalues(slope), key=abs, reverse=True)
     return Cycle(
         point=point,
         returns=returns,
@@ -176,6 +183,19 @@ def cycle_of(
         multipliers=tuple(multipliers),
         stable=abs(multipliers[0]) < 1.0,
     )
+
+
+def _eigenvalues(slope: FloatArray) -> list[complex]:
+    """Of a derivative (d, d); of two rows in closed form, the smaller by the product of both."""
+    if slope.shape != (2, 2):
+        return [complex(value) for value in np.linalg.eigvals(slope)]
+    (a, b), (c, d) = slope.tolist()
+    middle, half = 0.5 * (a + d), 0.5 * (a - d)
+    square = half * half + b * c
+    if square < 0.0:
+        return [complex(middle, side * math.sqrt(-square)) for side in (1.0, -1.0)]
+    larger = middle + math.copysign(math.sqrt(square), middle)
+    return [complex(larger), complex((a * d - b * c) / larger if larger else 0.0)]
 
 
 def _newton_step(slope: FloatArray, missing: FloatArray) -> FloatArray | None:

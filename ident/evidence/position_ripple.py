@@ -174,7 +174,8 @@ def find_waves(traces: Sequence[Trace]) -> tuple[Wave, ...]:
         after = _without(long, [*found, wavenumber], noise)
         quiet = _noise(after)
         # Judged against what is left, since a strong wave leaks over its neighbours and is noise of its own.
-        background = float(_background(_power(after, grid, quiet)[0])[peak])
+        beside = slice(max(peak - NEIGHBOURS, 0), peak + NEIGHBOURS + 1)
+        background = float(_background(_power(after, grid[beside], quiet)[0])[peak - beside.start])
         power = float(_power(left, np.array([wavenumber]), quiet)[0][0])
         around = grid[_near(grid, [wavenumber], long)]
         own = float(np.max(_power(left, around, quiet)[1], initial=0.0))

@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ident.model.numbers import is_number, keep_floats, real_array, shown
+from ident.model.numbers import LARGEST, is_number, is_quantity, keep_floats, real_array, shown
 
 STEEPEST_SHAPE: Final = 100.0
 
@@ -44,8 +44,11 @@ class StribeckCurve:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not is_number(value):
-                raise ModelError(f"{field.name} is {value!r}: a friction parameter is a finite number (eq 3)")
+            if not is_quantity(value):
+                raise ModelError(
+                    f"{field.name} is {shown(value)}: a friction parameter is a finite number up to "
+                    f"{LARGEST:g} (eq 3)"
+                )
         if self.coulomb_torque < 0:
             raise ModelError(f"coulomb_torque is {self.coulomb_torque:g} N m: F_c >= 0 (eq 3)")
         if self.static_torque < self.coulomb_torque:

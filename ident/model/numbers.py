@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _SCALARS: Final = (float, int, np.floating, np.integer)
+LARGEST: Final = 1e100  # of a parameter, a gain or a state, in SI: beyond it products and squares overflow
 _KINDS: Final = "fiu"  # of numpy's types: no words, no complex numbers, no objects
 
 
@@ -24,6 +25,11 @@ def is_number(value: object) -> bool:
         return isinstance(value, _SCALARS) and not isinstance(value, bool) and math.isfinite(value)
     except OverflowError:  # an int beyond every float
         return False
+
+
+def is_quantity(value: object) -> bool:
+    """Whether a value is a number that can be reckoned with: of a magnitude up to `LARGEST`."""
+    return is_number(value) and abs(float(value)) <= LARGEST  # type: ignore[arg-type]  # is_number has looked
 
 
 def is_number_or_inf(value: object) -> bool:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ident.model.friction import ModelError, StribeckFriction
-from ident.model.numbers import is_number, keep_floats
+from ident.model.numbers import LARGEST, is_quantity, keep_floats, shown
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,10 @@ class OneLinkRobot:
     friction: StribeckFriction
 
     def __post_init__(self) -> None:
-        if not (is_number(self.inertia) and self.inertia > 0):
-            raise ModelError(f"inertia is {self.inertia!r} kg m^2: a finite J > 0 (eq 1)")
+        if not (is_quantity(self.inertia) and self.inertia > 0):
+            raise ModelError(
+                f"inertia is {shown(self.inertia)} kg m^2: a finite J > 0, up to {LARGEST:g} (eq 1)"
+            )
         if not isinstance(self.friction, StribeckFriction):
             raise ModelError(f"friction is {self.friction!r}: a StribeckFriction (eqs 2-4)")
         keep_floats(self, ("inertia",))

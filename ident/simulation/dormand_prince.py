@@ -22,6 +22,7 @@ from ident.simulation.filippov_system import (
     OneStepMethod,
     Signs,
     Surfaces,
+    largest,
     switching_value,
 )
 from ident.simulation.polynomials import evaluate
@@ -59,9 +60,7 @@ def dormand_prince_step(
     `tolerance` is relative to the largest component of the state. Where `longest` is negative, a step of
     exactly that length is taken.
     """
-    size = 0.0
-    for i in range(state.size):
-        size = max(size, abs(state[i]))
+    size = largest(state)
     work[LIMITS, SCALE] = tolerance * size if size > 0.0 else tolerance
     exact = longest < 0.0
     shortest = -longest if exact else SHORTEST * longest

@@ -80,6 +80,15 @@ def assign(out: NDArray[Any], values: NDArray[Any]) -> None:
         out[i] = values[i]
 
 
+@compiled
+def largest(values: FloatArray) -> float:
+    """The largest magnitude among values (n,)."""
+    size = 0.0
+    for i in range(values.size):
+        size = max(size, abs(values[i]))
+    return size
+
+
 @specialised
 def switching_value(surfaces: Surfaces, index: int, state: FloatArray) -> float:
     """h_index at a state."""
@@ -148,7 +157,8 @@ def resolve(
     if minus < 0.0:
         return -1
     if plus == 0.0 and minus == 0.0:
-        for side in (1, -1):
+        own = -1 if signs[index] < 0 else 1
+        for side in (own, -own):
             leaving_rate(system, surfaces, index, side, signs, state, parameters, rate)
             for j in range(state.size):
                 rate[state.size + j] = state[j] + TANGENT_STEP * rate[j]

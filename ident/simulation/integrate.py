@@ -28,6 +28,7 @@ from ident.simulation.filippov_system import (
     Signs,
     Surfaces,
     assign,
+    largest,
     leaving_rate,
     project,
     resolve,
@@ -35,7 +36,7 @@ from ident.simulation.filippov_system import (
 )
 from ident.simulation.polynomials import evaluate, sum_up
 from ident.simulation.taylor import ORDER
-from ident.simulation.touching import back_along, has_left, turn_back
+from ident.simulation.touching import back_along, drive_across, has_left, turn_back
 
 TIME_REACHED: Final = 0
 EQUILIBRIUM: Final = 1
@@ -59,6 +60,7 @@ HELD_EVENTS: Final = (
 )
 SHORTEST_CRAWL: Final = 1e-9  # [s] of that holding, doubled each time
 LONGEST_CRAWL: Final = 1e-2  # [s]
+VANISHED: Final = 1e-290  # numbers that a motion can decay to: little more than the smallest there are
 BALANCE: Final = 1e-9  # of the rate on the other side: so slow a departure may be rounding
 
 
@@ -87,7 +89,7 @@ class Record(NamedTuple):
 class Progress(NamedTuple):
     """Where an integration stands."""
 
-    time: float  # of the equilibrium: when the last slide began
+    time: float  # of the equilibrium: when the last slide began, or the motion was over
     reason: int  # index into END_REASONS
     outputs: int  # how many of the wanted times are done
     events: int  # how many events are stored
@@ -113,7 +115,8 @@ def integrate(
     `memory` is of the shape that `memory_shape` tells.
 
     Output times before `time` are left alone. A state that slides for ever is reported as an equilibrium at
-    once, with its later outputs filled in; `state` is then where it tends to.
+    once, with its later outputs filled in; `state` is then where it tends to. So is a motion that decays
+    below all numbers, to where the field is zero.
     """
     n, m = state.size, signs.size
     polynomials, work = memory[: n + m], memory[n + m : n + m + WORK_ROWS]
@@ -125,7 +128,7 @@ def integrate(
     events = 0
     found = 0
     stalled = 0
-    touched = -1  # a surface that was turned back from, and has not been left since
+    touched = -1  # a surface that was met but not crossed, and has not been left since
     suggested = 1e-2
     crawl = SHORTEST_CRAWL
     for step in range(settings.step_limit):
@@ -166,9 +169,8 @@ def integrate(
             if not _finite(spread):
                 return Progress(time, NOT_FINITE, output, events, step)
             part = 1.0
-            for i in range(m):
-                if contact[i] == 0 and _is_clear(surfaces, i, signs[i], state, spread):
-                    continue
+            near = 0 if _is_clear(surfaces, signs, contact, state, spread) else m
+            for i in range(near):
                 _switching_polynomial(surfaces, i, n, degree, polynomials)
                 at = first_crossing(polynomials[n + i], degree, signs[i], contact[i], work[0])
                 if at <= part and (surface < 0 or at < part):
@@ -191,6 +193,12 @@ def integrate(
                 evaluate(polynomials, n, degree, part, after)
             stalled = stalled + 1 if now == time else 0
             time = now
+            if _dies_out(system, signs, parameters, state, after, rate):
+                assign(state, rate[:n])
+                while output < wanted and record.times[output] <= settings.end:
+                    assign(record.states[output], state)
+                    output += 1
+                return Progress(time, EQUILIBRIUM, output, events, step + 1)
             assign(state, after)
             for i in range(m):
                 contact[i] = 0
@@ -202,6 +210,10 @@ def integrate(
             reached = _meet(system, surfaces, parameters, surface, state, signs, contact, rate)
             if signs[surface] == arrived_from:
                 _hold(system, surfaces, parameters, surface, state, signs, contact, rate)
+                if reached == 1 and signs[surface] == arrived_from:
+                    if surface == touched:
+                        drive_across(surface, signs, contact)
+                    touched = surface
             elif reached == 1 and signs[surface] == -arrived_from and surface != touched:
                 time += turn_back(
                     system, surfaces, parameters, surface, arrived_from, settings.tolerance,
@@ -251,12 +263,40 @@ def _finite(spread: FloatArray) -> bool:
 
 
 @specialised
-def _is_clear(surfaces: Surfaces, index: int, sign: int, state: FloatArray, spread: FloatArray) -> bool:
-    """Whether a step cannot meet the surface: the one test that most steps need."""
-    reach = 0.0
-    for j in range(state.size):
-        reach += abs(surfaces.rows[index, j]) * spread[j]
-    return bool(sign * switching_value(surfaces, index, state) > reach)
+def _dies_out(
+    system: FilippovSystem,
+    signs: Signs,
+    parameters: FloatArray,
+    state: FloatArray,
+    after: FloatArray,
+    rate: FloatArray,
+) -> bool:
+    """Whether a step has led below all numbers, to zero and a field that is zero there, as `rate` then is."""
+    n = state.size
+    if not largest(after) < VANISHED <= largest(state):
+        return False
+    for j in range(n):
+        rate[n + j] = 0.0
+    system.field(signs, rate[n : 2 * n], parameters, rate)
+    return largest(rate[:n]) == 0.0
+
+
+@specialised
+def _is_clear(
+    surfaces: Surfaces, signs: Signs, contact: Signs, state: FloatArray, spread: FloatArray
+) -> bool:
+    """Whether a step can meet no surface: the one test that most steps need."""
+    n = state.size
+    near = 0
+    for i in range(signs.size):
+        value, reach = surfaces.rows[i, n], 0.0
+        for j in range(n):
+            factor = surfaces.rows[i, j]
+            value += factor * state[j]
+            reach += abs(factor) * spread[j]
+        if contact[i] != 0 or not signs[i] * value > reach:
+            near += 1
+    return near == 0
 
 
 @specialised
@@ -276,7 +316,7 @@ def _hold(
     """
     here = leaving_rate(system, surfaces, surface, signs[surface], signs, state, parameters, rate)
     there = leaving_rate(system, surfaces, surface, -signs[surface], signs, state, parameters, rate)
-    if abs(here) <= BALANCE * abs(there):
+    if abs(here) < BALANCE * abs(there):
         signs[surface] = 0
         contact[surface] = 0
 

@@ -13,9 +13,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ident.simulation.compiled import owning, specialised
+from ident.simulation.compiled import compiled, owning, specialised
 from ident.simulation.filippov_system import FloatArray, Signs, Surfaces
-from ident.simulation.integrate import STEP_LIMIT, TIME_REACHED, Progress
+from ident.simulation.integrate import STEP_LIMIT, TIME_REACHED, VANISHED, Progress
 from ident.simulation.packs import (
     fused,
     larger,
@@ -154,7 +154,7 @@ def integrate_side_by_side(
         _step(n, tolerance, left, reach, states, coefficients, lengths, ends, spreads)
         _clearance(n, m, surfaces, at.sides, states, spreads, clear)
         for lane in range(LANES):
-            free = who[lane] != IDLE and steps[lane] < step_limit
+            free = who[lane] != IDLE and steps[lane] < step_limit and _stays_large(n, ends, lane)
             for i in range(m):
                 free = free and clear[i, lane] > 0.0
             if not free:
@@ -293,6 +293,15 @@ def _step(
             value, bound, scale = value + term, bound + magnitude(term), scale * length
         place_pack(ends, i * LANES, pack_at(8, states, i * LANES) + value)
         place_pack(spreads, i * LANES, bound)
+
+
+@compiled
+def _stays_large(n: int, ends: FloatArray, lane: int) -> bool:
+    """Whether a lane's step does not lead below all numbers, where `integrate` tells what follows."""
+    size = 0.0
+    for i in range(n):
+        size = max(size, abs(ends[i, lane]))
+    return size >= VANISHED
 
 
 @specialised

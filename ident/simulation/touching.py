@@ -15,6 +15,7 @@ from ident.simulation.filippov_system import (
     FloatArray,
     Signs,
     Surfaces,
+    largest,
     leaving_rate,
     project,
     switching_value,
@@ -58,6 +59,12 @@ def turn_back(
 
 
 @compiled
+def drive_across(surface: int, signs: Signs, contact: Signs) -> None:
+    """Cross a surface that a motion comes to again, whatever its rate there: it is that of its errors."""
+    signs[surface], contact[surface] = -signs[surface], 2
+
+
+@compiled
 def back_along(state: FloatArray, rate: FloatArray, time: float, out: FloatArray) -> None:
     """The state (n,) a short `time` [s] ago, at a rate (n or more,)."""
     for j in range(state.size):
@@ -73,7 +80,4 @@ def has_left(surfaces: Surfaces, surface: int, tolerance: float, state: FloatArr
 @compiled
 def _error(tolerance: float, state: FloatArray) -> float:
     """What a step may err by: the tolerance is relative to the largest component of the state."""
-    size = 0.0
-    for j in range(state.size):
-        size = max(size, abs(state[j]))
-    return tolerance * size
+    return tolerance * largest(state)

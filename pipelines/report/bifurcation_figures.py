@@ -18,13 +18,12 @@ from matplotlib.patches import Patch
 from compensation.bifurcation import Branch, Diagram, Point
 from data.recording import FloatArray
 from pipelines.report.axis_units import units_of
-from pipelines.report.style import BLUE, INK, MUTED, VERMILLION, new_figure, styled, zero_lines
+from pipelines.report.marked_values import DOTTED, mark_values
+from pipelines.report.style import BLUE, INK, VERMILLION, new_figure, styled, zero_lines
 
 _PARAMETER: Final = {"r": "compensation gain $r$", "L": "observer gain $L$ [1/s]"}
 _ROMAN: Final = {"limit_cycle": "(I)", "equilibrium_set": "(II)", "equilibrium": "(III)"}
 _SET_OPACITY: Final = 0.25
-_LABEL_ROOM = 0.1  # of the axis, at its left end, where the name of a bifurcation stands on its right
-_DOTTED: Final = (0, (1.5, 2))
 
 
 @styled
@@ -46,22 +45,13 @@ def figure9(
         if branch.kind not in named and len(branch.points) > 1:
             _name(axes, branch)
             named.add(branch.kind)
-    values = {f"{diagram.parameter} = {change.value:.4g}": change.value for change in diagram.bifurcations}
-    ends = [point.value for branch in diagram.branches for point in branch.points]
-    for number, name in enumerate(values):
-        inwards = -1 if values[name] > min(ends) + _LABEL_ROOM * (max(ends) - min(ends)) else 1
-        axes.axvline(values[name], color=INK, linewidth=0.9, linestyle=_DOTTED, zorder=2.5)
-        axes.annotate(
-            name, (values[name], 1.0), (4 * inwards, -2 - 11 * (number % 3)),
-            xycoords=("data", "axes fraction"), textcoords="offset points",
-            ha="right" if inwards < 0 else "left", va="top", fontsize=8.0, color=MUTED, parse_math=False,
-        )  # fmt: skip
     unit = units_of(axis).position
     axes.set(
         xlabel=_PARAMETER.get(diagram.parameter, diagram.parameter),
         ylabel=f"$x_1$ at rest, $\\max|x_1|$ of a cycle [{unit}]",
     )
     axes.margins(x=0.0)
+    mark_values(axes, diagram.parameter, [change.value for change in diagram.bifurcations])
     handles = _legend(diagram)
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles) if len(handles) < 4 else 3)
     return figure
@@ -71,17 +61,31 @@ def draw_branch(axes: Axes, branch: Branch, *, cycle: str, rest: str) -> None:
     """One branch: a filled set, a line of amplitudes, or a line of equilibria; dashed where unstable."""
     value, low, high, amplitude = branch_arrays(branch.points)
     dashes = "-" if branch.stable else (0, (4, 2.2))
+    dot = "o" if value.size == 1 else "none"  # no line shows what exists at one value only
     if branch.kind == "limit_cycle":
-        axes.plot(value, amplitude, color=cycle, linestyle=dashes, linewidth=2.0, zorder=3.2)
+        axes.plot(
+            value,
+            amplitude,
+            color=cycle,
+            linestyle=dashes,
+            linewidth=2.0,
+            marker=dot,
+            markersize=4,
+            zorder=3.2,
+        )
     elif branch.kind == "equilibrium_set":
         axes.fill_between(value, low, high, color=rest, alpha=_SET_OPACITY, linewidth=0, zorder=2)
         for edge in (low, high):
-            axes.plot(value, edge, color=rest, linestyle=dashes, linewidth=1.2, zorder=2.6)
+            axes.plot(
+                value, edge, color=rest, linestyle=dashes, linewidth=1.2, marker=dot, markersize=3, zorder=2.6
+            )
+        if value.size == 1:
+            axes.vlines(value, low, high, color=rest, alpha=_SET_OPACITY, linewidth=3, zorder=2)
     else:
-        middle = 0.5 * (low + high)
-        axes.plot(value, middle, color=INK, linestyle=dashes, linewidth=1.4, zorder=3)
-        if value.size == 1:  # a set that has shrunk to a point at this one value
-            axes.plot(value, middle, marker="o", markersize=4, color=INK, zorder=3)
+        axes.plot(
+            value, 0.5 * (low + high), color=INK, linestyle=dashes, linewidth=1.4, marker=dot, markersize=4,
+            zorder=3,
+        )  # fmt: skip
 
 
 def branch_arrays(points: Sequence[Point]) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
@@ -124,5 +128,5 @@ def _legend(diagram: Diagram) -> list[Line2D | Patch]:
     if ("equilibrium", True) in kinds:
         handles.append(Line2D([], [], color=INK, label="stable equilibrium point"))
     if diagram.bifurcations:
-        handles.append(Line2D([], [], color=INK, linestyle=_DOTTED, linewidth=0.9, label="bifurcation"))
+        handles.append(Line2D([], [], color=INK, linestyle=DOTTED, linewidth=0.9, label="bifurcation"))
     return handles

@@ -16,6 +16,9 @@ from data.recording import FloatArray
 from pipelines.report.axis_units import units_of
 from pipelines.report.style import BLUE, INK, MUTED, OVER, UNDER, new_figure, styled, zero_lines
 
+_CROWDED = 0.2  # of the axis; the median of an even one lies at its middle
+_POLE = 2.0  # times what is seen after the first tenth of the gains
+
 
 @styled
 def figure4(
@@ -40,13 +43,14 @@ def figure4(
     axes.fill_between(observer_gain, *uncompensated.T, color=MUTED, alpha=0.10, linewidth=0)
     axes.plot(observer_gain, exact, color=BLUE, zorder=3.2)
     axes.fill_between(observer_gain, *exact.T, color=BLUE, alpha=0.28, linewidth=0, zorder=2)
-    low, high = axes.get_ylim()
+    _show_gains(axes, observer_gain)
+    high, low = _shown_end(observer_gain, uncompensated), -_shown_end(observer_gain, -uncompensated)
     axes.annotate(
         "no compensation, r = 0", (observer_gain[-1], float(np.max(uncompensated[-1]))), (-8, -8),
         textcoords="offset points", ha="right", va="top", color=MUTED,
     )  # fmt: skip
     axes.annotate(
-        "exact compensation, r = 1", (observer_gain[0], float(np.max(exact[0]))), (8, 3),
+        "exact compensation, r = 1", (observer_gain[0], min(float(np.max(exact[0])), 0.8 * high)), (8, 3),
         textcoords="offset points", color=BLUE,
     )  # fmt: skip
     if critical_gain is not None:
@@ -54,8 +58,8 @@ def figure4(
     axes.set(
         xlabel="observer gain $L$ [1/s]", ylabel=f"position error at rest $x_1$ [{units_of(axis).position}]"
     )
-    axes.set_xlim(observer_gain[0], observer_gain[-1])
-    axes.set_ylim(1.06 * low, 1.06 * high)
+    if high > low:
+        axes.set_ylim(1.1 * low, 1.1 * high)
     return figure
 
 
@@ -94,10 +98,29 @@ def figure8(
     axes.set(
         xlabel="observer gain $L$ [1/s]", ylabel=f"position error at rest $|x_1|$ [{units_of(axis).position}]"
     )
-    axes.set_xlim(observer_gain[0], observer_gain[-1])
-    axes.set_ylim(0.0, None)
+    _show_gains(axes, observer_gain)
+    high = max((_shown_end(observer_gain, curve) for curve in edges.values()), default=0.0)
+    axes.set_ylim(0.0, 1.05 * high if high > 0 else None)
     figure.legend(loc="outside right center", handlelength=1.4)
     return figure
+
+
+def _show_gains(axes: Axes, observer_gain: FloatArray) -> None:
+    """The axis of gains as they are spread: by ratios where most of them crowd at its lower end."""
+    if observer_gain.size and np.median(observer_gain) < _CROWDED * observer_gain[-1]:
+        axes.set_xscale("log")
+    axes.set_xlim(observer_gain[0], observer_gain[-1])
+
+
+def _shown_end(observer_gain: FloatArray, curve: FloatArray) -> float:
+    """How high to show curves (n, 2) over gains (n,): all of them, or what is no pole at their lower end.
+
+    A set grows beyond bounds as b + L J goes to 0, and would press all else to the axis.
+    """
+    finite = np.where(np.isfinite(curve), curve, 0.0)
+    whole = float(np.max(finite, initial=0.0))
+    settled = float(np.max(finite[observer_gain.size // 10 :], initial=0.0))
+    return min(whole, _POLE * settled) if settled > 0 else whole
 
 
 def _mark_critical(axes: Axes, gain: float) -> None:

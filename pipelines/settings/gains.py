@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Final
 
 from compensation.controller import Gains
 from ident.model.friction import ModelError
+from ident.model.numbers import LARGEST
 from pipelines.exit_status import UsageError
 from pipelines.settings.loop import LoopDefaults
 
@@ -47,9 +48,9 @@ def chosen_loop(defaults: LoopDefaults, options: GainOptions) -> LoopDefaults:
         name: value for name in (*OPTIONS, "sample_period") if (value := getattr(options, name)) is not None
     }
     for name, value in spoken.items():
-        if not math.isfinite(value) or value < 0:
+        if not 0.0 <= value <= LARGEST:
             option = OPTIONS.get(name, "--sample-period")
-            raise UsageError(f"{option} is {value}: give a finite number >= 0")
+            raise UsageError(f"{option} is {value}: give a finite number >= 0, up to {LARGEST:g}")
     return replace(defaults, **spoken)
 
 

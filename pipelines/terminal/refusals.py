@@ -21,6 +21,7 @@ P = ParamSpec("P")
 
 DEBUG: Final = "STRIBECK_DEBUG"
 INTERRUPTED: Final = 130
+_REMEDY: Final = "Look at that path, its rights and the room on its disk, or name another (results: -o)"
 
 
 def ends_well(command: Callable[P, Status]) -> Callable[P, None]:
@@ -52,7 +53,7 @@ def _refused(failure: Exception) -> int:
         return Status.REFUSED
     if isinstance(failure, OSError) and failure.strerror:
         where = f"{failure.filename}: " if failure.filename else ""
-        _say(f"{where}{failure.strerror}")
+        _say(f"{where}{failure.strerror}. {_REMEDY}")
         return Status.REFUSED
     if os.environ.get(DEBUG):
         traceback.print_exception(failure)

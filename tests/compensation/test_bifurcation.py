@@ -2,14 +2,19 @@
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from compensation.bifurcation import Branch, Diagram, diagram, where_it_ends
 from compensation.closed_loop import ClosedLoop
 from compensation.coexistence import largest_compensation_with_rest
 from compensation.controller import Controller, Gains
+from compensation.loop_section import LoopSection
+from compensation.orbits.periodic_orbits import Cycle, find_cycle
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot, symmetric_robot
 from ident.model.robot import OneLinkRobot
+from ident.simulation.filippov_system import FloatArray
 
 
 def loop(r: float = 1.0, observer: float = 73.5, robot: OneLinkRobot | None = None) -> ClosedLoop:
@@ -98,8 +103,78 @@ def test_both_mirror_images_are_drawn_where_the_symmetry_is_broken() -> None:
 def test_a_loss_of_symmetry_between_two_values_is_named() -> None:
     """Of the pair below 1.000011 the grid of figure 9 has no value."""
     drawn = diagram(loop(), "r", np.linspace(0.8, 1.2, 200))
-    assert changes(drawn, "symmetry breaking") == pytest.approx([1.000011], abs=1e-6)
+    assert changes(drawn, "symmetry breaking") == pytest.approx([1.0000109863], abs=4e-8)
     assert len(branches(drawn, "limit_cycle")) == 1
+
+
+GRIDS = [
+    np.linspace(0.99, 1.02, 7),
+    np.array([0.0, 2.0]),
+    np.array([0.0, 1e4]),
+    np.array([1.0, 1e9]),
+    np.linspace(0.0, 1e6, 5),
+    np.array([1.0, 1.0 + 1e-12, 1.0 + 1e-9, 1.1]),
+    np.array([1.0 - 1e-13, 1.0 + 1e-13, 1.00002]),
+    1.0 + np.concatenate([[-1e-3], np.geomspace(1e-10, 1e-3, 20)]),
+]
+
+
+@pytest.mark.parametrize("grid", GRIDS)
+def test_grids_of_every_width_tell_of_the_same_events(grid: FloatArray) -> None:
+    """By small steps along it the symmetric cycle goes on down to 1.0000109862853."""
+    drawn = diagram(loop(), "r", grid)
+    assert changes(drawn, "limit cycle") == pytest.approx([1.0], abs=5e-16)
+    assert [b.kind for b in drawn.bifurcations if "limit cycle" in b.kind] == [
+        "limit cycle appears, from zero amplitude"
+    ]
+    assert changes(drawn, "symmetry breaking") == pytest.approx([1.0000109862853], abs=4e-8)
+
+
+@given(
+    low=st.floats(0.0, 1.0),
+    widths=st.lists(st.floats(-2.5, 3.0), min_size=2, max_size=4, unique=True),
+)
+@settings(max_examples=5, deadline=None)
+def test_random_grids_tell_of_the_same_events_below_the_critical_gain(
+    low: float, widths: list[float]
+) -> None:
+    """At L = 40 cycles appear at r = 1, with a jump; a symmetric one lives from 1.00178184085 on."""
+    grid = np.unique([low, *(1.0 + 10.0 ** np.array(widths))])
+    drawn = diagram(loop(observer=40.0), "r", grid)
+    assert changes(drawn, "limit cycle appears, with a jump")[0] == pytest.approx(1.0, abs=5e-16)
+    breaking = [value for value in changes(drawn, "symmetry breaking") if value < 1.1]
+    if grid[1] < 1.5:
+        assert breaking == pytest.approx([1.00178184085], abs=4e-8)
+
+
+def test_both_sides_of_a_hysteresis_are_one_event() -> None:
+    """The pair lives up to 1.000011129, beside the symmetric cycle, which lives down to 1.0000109863."""
+    drawn = diagram(loop(), "r", [1.000005, 1.00002])
+    (change,) = drawn.bifurcations
+    assert change.kind.startswith("symmetry breaking")
+    assert change.value == pytest.approx(1.0000109862853, abs=1e-8)
+
+
+def test_a_symmetric_cycle_does_not_double_its_period() -> None:
+    """At L = 40 it loses its stability at r = 1.779938, where the multiplier of half a turn is -1."""
+    drawn = diagram(loop(observer=40.0), "r", np.linspace(1.77, 1.79, 3))
+    assert not changes(drawn, "period doubling")
+    values = changes(drawn, "symmetry breaking")
+    assert min(abs(value - 1.779938) for value in values) < 2e-6
+    section = LoopSection(loop(r=1.779945, observer=40.0))
+    cycle = find_cycle(section, np.array([1.0996841872565, 0.0]))
+    assert isinstance(cycle, Cycle)
+    slope = section.derivative(cycle.point)
+    assert slope is not None
+    assert min(np.linalg.eigvals(slope).real) == pytest.approx(-np.sqrt(0.7829), abs=1e-3)
+
+
+@pytest.mark.parametrize("r", [1e6, 1e10, 1e13])
+def test_a_huge_compensation_gain_makes_a_huge_cycle(r: float) -> None:
+    """There friction is nothing beside compensation: amplitudes grow in proportion to r, the period stays."""
+    (cycle,) = branches(diagram(loop(), "r", [r]), "limit_cycle")
+    assert cycle.points[0].amplitude / r == pytest.approx(1.3910484265, rel=2e-6)
+    assert cycle.points[0].period == pytest.approx(1.7932994913, rel=2e-6)
 
 
 def test_over_the_observer_gain() -> None:

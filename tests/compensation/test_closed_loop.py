@@ -274,17 +274,57 @@ def test_a_law_steep_at_rest_gives_one_answer_at_any_tolerance(tolerance: float)
     assert all(event.state[1] == 0.0 and abs(event.time - 3.663975) < 1e-5 for event in touches)
 
 
-def test_outputs_beside_a_touch_are_given() -> None:
+def steep_at_rest() -> ClosedLoop:
     curves = (
         StribeckCurve(0.5286936891539086, 0.23763953395726653, 0.9387431402033812, 0.07256747300213409, 0.5),
         StribeckCurve(0.41053773608123, 0.1701705097060093, 0.07335445580999159, 0.05763675068894312, 0.7),
     )
     robot = OneLinkRobot(0.13171421188476312, StribeckFriction(*curves))
     gains = Gains(0.31411756522579815, 0.1639009763066145, 195.05679993268467, 1.5)
+    return ClosedLoop(robot, Controller(gains, robot))
+
+
+def test_outputs_beside_a_touch_are_given() -> None:
     start = (0.0031822651477523265, -0.001439143192609839, 0.0013835486555378589)
-    run = simulate(ClosedLoop(robot, Controller(gains, robot)), start, duration=40.0)
+    run = simulate(steep_at_rest(), start, duration=40.0)
     assert run.end_reason == "time reached"
     assert np.isfinite(run.state).all()
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        (-0.5342351163849932, 1.1958303618851656, -0.20346067749153213),
+        (-0.0164117683799156, 0.0197338150416545, 0.0175433249184597),
+    ],
+)
+def test_a_touch_is_met_once_and_then_crossed(start: tuple[float, float, float]) -> None:
+    """The rate at the surface is rounding there, and may point back as often as the surface is met."""
+    truth = simulate(steep_at_rest(), start, duration=40.0, times=(), tolerance=1e-13)
+    for tolerance in (1e-8, 1e-9, 1e-10, 1e-11, 1e-12):
+        run = simulate(steep_at_rest(), start, duration=40.0, times=(), tolerance=tolerance)
+        assert run.end_reason == "time reached", tolerance
+        kinds = [event.kind for event in run.events if event.kind != "estimate touch"]
+        assert kinds == ["estimate reversal", "velocity reversal"] * 2, tolerance
+        assert len(run.events) - len(kinds) <= 2, tolerance  # one for each crossing
+        np.testing.assert_allclose(run.end_state, truth.end_state, atol=10.0 * tolerance**0.5, rtol=0)
+
+
+@pytest.mark.parametrize("shape", [0.7, 1.0, 1.5, 2.0])
+@pytest.mark.parametrize("damping", [0.02, 0.5])  # swings, creeps
+def test_a_motion_that_decays_below_all_numbers_is_over(shape: float, damping: float) -> None:
+    """At r = 1 without an observer error: a linear oscillator, which tends to the set point for ever."""
+    curve = replace(symmetric_robot().friction.positive, stribeck_shape=shape)
+    robot = OneLinkRobot(0.026, StribeckFriction.symmetric(curve))
+    case = ClosedLoop(robot, Controller(Gains(0.4, damping, 73.5, 1.0), robot))
+    rates = np.roots([0.026, curve.viscous_damping + damping, 0.4]).real
+    over = 290.0 * math.log(10.0) / -rates.max()
+    run = simulate(case, START, duration=2.0 * over, times=[0.9 * over, 1.1 * over, 2.0 * over])
+    assert run.end_reason == "equilibrium"
+    assert run.end_time == pytest.approx(over, rel=0.01)
+    assert 0.0 < np.max(np.abs(run.state[0])) < 1e-250
+    assert not run.state[1:].any()
+    assert not run.end_state.any()
 
 
 @pytest.mark.parametrize("shape", [0.5, 0.7, 0.9])

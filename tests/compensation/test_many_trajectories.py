@@ -76,6 +76,14 @@ def test_side_by_side_no_observer_error_appears_where_there_is_none() -> None:
     assert np.all(many.state[:, :, 2] == 0.0)
 
 
+def test_side_by_side_what_decays_below_all_numbers_is_over() -> None:
+    starts = np.column_stack([np.linspace(-1.0, 1.0, 16), np.zeros(16), np.zeros(16)])
+    gains = np.tile([0.4, 0.5, 40.0, 1.0], (16, 1))
+    many = simulate_many(LOOP, starts, duration=2000.0, times=[2000.0], gains=gains)
+    assert set(many.end_reasons) == {"equilibrium"}
+    assert not many.state.any()
+
+
 def test_one_controller_and_another_shape() -> None:
     curve = replace(symmetric_robot().friction.positive, stribeck_shape=1.5)
     robot = replace(symmetric_robot(), friction=StribeckFriction.symmetric(curve))

@@ -168,13 +168,13 @@ def test_a_controller_that_runs_away_is_refused_with_its_reason() -> None:
 
 def test_gains_that_no_rig_has_are_not_blamed_on_the_duration() -> None:
     robot = symmetric_robot()
-    stiff = Controller(Gains(1e300, 0.02, observer=73.5, compensation=1.0), robot)
+    stiff = Controller(Gains(1e100, 0.02, observer=73.5, compensation=1.0), robot)
     with pytest.raises(RefusalError, match="Give gains that a rig can have"):
         simulate_loop(robot, stiff, start=(1.0, 0, 0), duration=20.0)
 
 
-@pytest.mark.parametrize(("shape", "end"), [(1.0, "equilibrium"), (1.5, "decayed to the set point")])
-def test_a_motion_that_decays_below_all_numbers_ends_at_the_set_point(shape: float, end: str) -> None:
+@pytest.mark.parametrize("shape", [1.0, 1.5])
+def test_a_motion_that_decays_below_all_numbers_ends_at_the_set_point(shape: float) -> None:
     law = replace(symmetric_robot().friction.positive, viscous_damping=0.3, stribeck_shape=shape)
     robot = replace(symmetric_robot(), friction=StribeckFriction.symmetric(law))
     exact = Controller(Gains(1.0, 0.05, observer=73.5, compensation=1.0), robot)
@@ -182,4 +182,4 @@ def test_a_motion_that_decays_below_all_numbers_ends_at_the_set_point(shape: flo
     assert run.time[-1] == 250.0
     np.testing.assert_array_equal(run.state[-1], 0.0)
     assert np.all(np.isfinite(run.state))
-    assert run.end.startswith(end)
+    assert run.end == "equilibrium"

@@ -97,6 +97,18 @@ class TestFigures4And8:
         assert len(dashed) == 1
         np.testing.assert_array_equal(np.isfinite(dashed[0].get_ydata()), [True, True, False, False, False])
 
+    def test_gains_that_are_spread_by_ratios_are_drawn_so(self) -> None:
+        for gain, scale in ((np.linspace(1.0, 100.0, 50), "linear"), (np.geomspace(1.0, 1e6, 50), "log")):
+            curve = np.column_stack((-1.0 / gain, 1.0 / gain))
+            assert figure8(gain, {1.0: curve}, critical_gain=None).axes[0].get_xscale() == scale
+            assert figure4(gain, curve, curve, critical_gain=None).axes[0].get_xscale() == scale
+
+    def test_a_pole_at_small_gains_does_not_hide_the_rest(self) -> None:
+        gain = np.linspace(1.0, 100.0, 100)
+        curve = np.column_stack((-1e4 * gain**-6.0, 2e4 * gain**-6.0 + 1.0))
+        assert figure8(gain, {1.0: curve}, critical_gain=None).axes[0].get_ylim()[1] < 4.0
+        assert figure4(gain, curve, curve, critical_gain=None).axes[0].get_ylim()[1] < 4.0
+
 
 class TestFigures6And7:
     def test_the_perturbation_is_named(self) -> None:
@@ -145,6 +157,12 @@ class TestFigure9:
         point = Branch("equilibrium", True, (Point(1.0, 0.0, 0.0, 0.0),))
         marks = _marks(figure9(replace(examples.diagram(), branches=(point,))).axes[0], "o")
         assert [float(np.ravel(mark.get_xdata())[0]) for mark in marks] == [1.0]
+
+    def test_a_cycle_at_one_value_only_is_seen(self) -> None:
+        one = Branch("limit_cycle", True, (Point(1.1, -0.3, 0.3, 0.3),))
+        span = Branch("equilibrium_set", True, (Point(0.9, -0.2, 0.1, 0.2),))
+        marks = _marks(figure9(replace(examples.diagram(), branches=(one, span))).axes[0], "o")
+        assert sorted(float(np.ravel(mark.get_ydata())[0]) for mark in marks) == [-0.2, 0.1, 0.3]
 
 
 class TestFigure10:
