@@ -94,7 +94,7 @@ class Advancing:
 
 
 def advancing(seconds: FloatArray, *, fewest: int) -> Advancing:
-    """Make stamps (n,) [s] advance; parts of under `fewest` samples are left out, so that none may be left."""
+    """Make stamps (n,) [s] advance; parts of under `fewest` samples are left out, and none may be left."""
     step = np.diff(seconds)
     every = np.arange(seconds.size)
     median = float(np.median(step[step > 0.0])) if np.any(step > 0.0) else 0.0

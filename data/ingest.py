@@ -208,7 +208,7 @@ def read_bytes(path: Path, *, log: str) -> ByteArray:
 
 
 def _resolution(run: Run, *, axis: Axis, encoder_counts: float | None) -> float | None:
-    """One encoder count [rad], as declared where it is; raises LogError where the positions' own belies it."""
+    """One encoder count [rad], declared or found; raises LogError where the positions belie the declared."""
     found = lattice_spacing(run.position[np.isfinite(run.position)])
     if encoder_counts is None:
         return found

@@ -34,7 +34,11 @@ IndexArray = NDArray[np.intp]
 FEWEST_SAMPLES: Final = 10
 AT_LIMIT: Final = 0.999  # of a declared torque limit
 FLAT_SAMPLES: Final = 5  # at the largest torque
-BANDS: Final = (0.005, 0.2, 12)  # least and most of a torque's range that noise may cover, and how many are tried
+BANDS: Final = (
+    0.005,
+    0.2,
+    12,
+)  # least and most of a torque's range that noise may cover, and how many are tried
 FLAT_SHARE: Final = 0.03  # of a run; a tenth of it where exactly one number comes back
 LEVELS: Final = 10  # other sizes that a torque takes, or it is a square wave
 PILED_UP: Final = 4.0  # times as often at the largest torque as right below it
@@ -308,7 +312,7 @@ def drop_spikes(run: Signals, resolution: float | None) -> tuple[Signals, tuple[
 
 
 def _smallest_step(position: FloatArray) -> float:
-    """The smallest step that positions (n,) make [rad]: a count, where they have too few values to show one."""
+    """The smallest step of positions (n,) [rad]: a count, where they have too few values to show one."""
     steps = np.abs(np.diff(position))
     steps = steps[steps > 1e-12 * float(np.max(np.abs(position), initial=0.0))]
     return float(steps.min()) if steps.size else 0.0
@@ -391,9 +395,9 @@ def require_torque_size(run: Signals, torque_limit: float | None) -> None:
     if size <= FAR_BEYOND * torque_limit:
         return
     raise LogError(
-        f"{run.log}: E-UNIT refuse: the torque reaches {size:.4g}, {size / torque_limit:.4g} times the torque "
-        f"limit of {torque_limit:g} that [rig] declares: it looks like mN m, or a current without its torque "
-        "constant; every torque and the inertia would be off by such a factor. Correct `unit` or `scale` of "
+        f"{run.log}: E-UNIT refuse: the torque reaches {size:.4g}, {size / torque_limit:.4g} times the "
+        f"torque limit of {torque_limit:g} that [rig] declares: it looks like mN m, or a current without its "
+        "torque constant; every torque and the inertia would be off by such a factor. Correct `unit` or `scale` of "
         "the torque in [signals], or the limit"
     )
 
@@ -405,9 +409,9 @@ def require_count(run: Signals, *, found: float, declared: float) -> None:
     if looks is None:
         return
     raise LogError(
-        f"{run.log}: E-UNIT refuse: the position moves in steps of {found:.6g}, {factor:#.4g} times the count "
-        f"of {declared:.6g} that `encoder_counts` declares: {looks}; the inertia, b and v_s would be off by "
-        "such a factor. Correct `unit` of the position in [signals], or `encoder_counts`"
+        f"{run.log}: E-UNIT refuse: the position moves in steps of {found:.6g}, {factor:#.4g} times the "
+        f"count of {declared:.6g} that `encoder_counts` declares: {looks}; the inertia, b and v_s would be "
+        "off by such a factor. Correct `unit` of the position in [signals], or `encoder_counts`"
     )
 
 

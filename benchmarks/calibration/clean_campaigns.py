@@ -1,9 +1,8 @@
 """Campaigns of rigs of many sizes in which nothing is wrong, before anything has screened them.
 
-A rig is Table 1's, one with both directions alike, a scaled one, or a linear axis; its encoder has 10^4 to 2^18
-counts where Table 1's would (scaled with v_s), its torque noise is 0.2 to 2 % of F_c, its sample rate 250 Hz to
-4 kHz, no slower than the link's own time constant asks for. Friction that falls with speed makes
-the link's time constant J / (dF/v_s - b), 5 to 200 ms; J follows from it.
+A rig is Table 1's, one with both directions alike, a scaled one, or a linear axis. Its encoder has 10^4 to
+2^18 counts (scaled with v_s), its torque noise is 0.2 to 2 % of F_c, its sample rate 250 Hz to 4 kHz, but no
+slower than the link's time constant J / (dF/v_s - b) asks for. That is 5 to 200 ms, and J follows from it.
 
 Steady speeds are held by the virtual rig's speed loop where the encoder lets it, or are imposed (a loop that
 closes on a better sensor than the log's); ramps and multisines are always played on the link.
@@ -25,12 +24,13 @@ from data.screening import Signals
 from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot
 from ident.model.robot import OneLinkRobot
-from ident.response import TorqueRipple, plant_array
+from ident.response import NO_RIPPLE, TorqueRipple, plant_array
 from pipelines.settings.virtual_rig import MultisineSettings, TrueCurve, TrueRobot, VirtualRig
 from pipelines.virtual.bench import Bench, Motion, play_ramps, play_speed
 from pipelines.virtual.protocols import multisines, speed_loop
 
 LOOP_COUNTS: Final = 2.0**16  # from which the speed loop holds the slowest speeds
+LOOP_PERIODS: Final = 10.0  # in J / (dF/v_s - b), from which it does
 SPEEDS: Final = 10  # in each direction
 SLOWEST: Final = 0.12  # v_s
 FASTEST: Final = 30.0  # v_s
@@ -49,7 +49,7 @@ class Rig:
     declared: bool  # whether the campaign knows the encoder
     torque_limit: float | None  # as declared [N m]
     fine: bool  # whether the speed loop holds the slowest speeds on this encoder
-    ripple: TorqueRipple = TorqueRipple()
+    ripple: TorqueRipple = NO_RIPPLE
 
     @property
     def velocity(self) -> float:
@@ -141,17 +141,18 @@ def random_rig(generator: np.random.Generator) -> Rig:
     counts = 10.0 ** generator.uniform(4.0, math.log10(2.0**18))
     pace = robot.inertia / _steepest(robot)
     rates = [rate for rate in (250.0, 500.0, 1000.0, 2000.0, 4000.0) if pace * rate > 3.0]
+    period = 1.0 / float(generator.choice(rates))
     coulomb = robot.mean().friction.positive.coulomb_torque
     static = robot.mean().friction.positive.static_torque
     return Rig(
         robot=robot,
         axis="linear" if kind == "linear" else "rotary",
-        period=1.0 / float(generator.choice(rates)),
+        period=period,
         resolution=velocity / 0.07525 * 2.0 * math.pi / counts,
         noise=coulomb * 10.0 ** generator.uniform(math.log10(0.002), math.log10(0.02)),
         declared=bool(generator.random() < 0.7),
         torque_limit=4.0 * static if generator.random() < 0.5 else None,
-        fine=counts > LOOP_COUNTS,
+        fine=counts > LOOP_COUNTS and pace > LOOP_PERIODS * period,
     )
 
 

@@ -1,7 +1,7 @@
 """Whether every failure is seen with its severity, and a clean campaign raises none.
 
-    fault <CODE>         part of the campaigns with that fault that get its code at the right severity, and are
-                         neither refused nor stripped of anything under another code
+    fault <CODE>         part of the campaigns with that fault that get its code at the right severity, and
+                         are neither refused nor stripped of anything under another code
     false alarms <CODE>  part of the clean campaigns that get the code
     false alarms in all  part of the clean campaigns that get any
 
@@ -49,8 +49,7 @@ def rows(quick: bool) -> list[Row]:
     seen = Counter(code for (code, _), well in zip(tasks, right, strict=True) if well)
     found = [figure(f"fault {code}", seen[code] / seeds, 0.99, "of campaigns") for code in FAULTS]
     raised = Counter(code for codes in alarms for code in codes)
-    for code in FAULTS:
-        found.append(figure(f"false alarms {code}", raised[code] / clean, 0.01, "of campaigns"))
+    found += [figure(f"false alarms {code}", raised[code] / clean, 0.01, "of campaigns") for code in FAULTS]
     share = sum(bool(codes) for codes in alarms) / clean
     return [*found, figure("false alarms in all", share, 0.05, "of campaigns")]
 

@@ -25,7 +25,6 @@ from benchmarks.calibration.clean_campaigns import (
     steady_log,
 )
 from data.findings import Severity
-from data.recording import FloatArray
 from data.screening import Signals
 from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
@@ -152,7 +151,9 @@ def saturation(generator: Generator) -> Injected:
     quiet = replace(rig, noise=0.0)
     if generator.random() < 0.5:
         limit = rig.static * generator.uniform(0.5, 0.9)
-        log = _held(ramp_log(quiet, float(generator.choice([-0.45, 0.45])) * rig.static, generator, limit=limit))
+        log = _held(
+            ramp_log(quiet, float(generator.choice([-0.45, 0.45])) * rig.static, generator, limit=limit)
+        )
     else:
         log = multisine_logs(quiet, generator)[0]
         limit = float(np.quantile(np.abs(log.torque), generator.uniform(0.85, 0.95)))
@@ -170,7 +171,9 @@ def _held(log: Signals) -> Signals:
     size = np.abs(log.torque)
     often = np.where(size == size.max(), 3, 1)
     torque, position = np.repeat(log.torque, often), np.repeat(log.position, often)
-    return replace(log, time=np.arange(torque.size) * (log.time[1] - log.time[0]), position=position, torque=torque)
+    return replace(
+        log, time=np.arange(torque.size) * (log.time[1] - log.time[0]), position=position, torque=torque
+    )
 
 
 def unit(generator: Generator) -> Injected:
@@ -246,7 +249,7 @@ def creep(generator: Generator) -> Injected:
     measured = np.rint((position + offset) / rig.resolution) * rig.resolution
     log = replace(
         whole,
-        time=rig.period * np.arange(torque.size),
+        time=rig.period * np.arange(torque.size, dtype=np.float64),
         position=np.concatenate((measured, whole.position)),
         torque=torque,
     )
@@ -261,7 +264,7 @@ def unsteady(generator: Generator) -> Injected:
     time = np.arange(0.0, duration, rig.period)
     part = time / duration
     if generator.random() < 0.5:
-        settling = generator.uniform(0.05, 0.12)
+        settling = generator.uniform(0.12, 0.18)
         shape = 1.0 + generator.choice([-0.3, 0.3]) * np.exp(-part / settling)
         right = (WARN,)
     else:
@@ -433,7 +436,7 @@ def lack_of_fit(generator: Generator) -> Injected:
 
 
 def two_minima(generator: Generator) -> Injected:
-    """Friction that falls twice, over 0.3 v_s and over 6 v_s, equally: either may be the Stribeck velocity."""
+    """Friction that falls twice as much, over 0.3 v_s and over 6 v_s: either may be the Stribeck velocity."""
     rig = random_rig(generator)
     speeds = rig.velocity * np.array([0.15, 0.4, 1.0, 2.5, 6.0, 15.0, 40.0])
     logs = []

@@ -151,6 +151,10 @@ def run_findings(evidence: Evidence) -> tuple[Finding, ...]:
             continue
         severity = Severity.WARN if code in {"E-CREEP", "E-SAT"} else Severity.WITHHOLD
         found.append(Finding(code, severity, f"{log}, {where:.3g} s: {text}", log))
+    trimmed = [run for run in evidence.used_runs if run.trimmed is not None]
+    for run in trimmed:
+        code, _, text = str(run.trimmed).partition(": ")
+        found.append(Finding(code, Severity.WARN, f"{run.log}: {text}", run.log))
     return tuple(found)
 
 
@@ -212,7 +216,9 @@ def _require_one_unit(evidence: Evidence) -> None:
     for speed, torque, log in steady:
         near = [own for other, own, name in steady if name != log and NEAR**-1 < other / speed < NEAR]
         if len(near) >= 3:
-            _require_same(torque, float(np.median(near)), f"{log}: the torque at {speed:.3g} rad/s", "other logs")
+            _require_same(
+                torque, float(np.median(near)), f"{log}: the torque at {speed:.3g} rad/s", "other logs"
+            )
     starts = [abs(start.torque) for start in evidence.used_starts]
     if starts and typical > 0.0:
         log = evidence.used_starts[0].log
@@ -228,8 +234,8 @@ def _require_same(own: float, others: float, what: str, source: str) -> None:
     if ABSURD**-1 < ratio < ABSURD:
         return
     raise IdentificationError(
-        f"E-UNIT: {what} is {own:.4g}, that of the {source} {others:.4g}: {ratio:.4g} times. No rig's friction or "
-        "inertia changes so much: the torque of one of them looks like another unit (mN m, or A without its "
-        "torque constant), and every torque and the inertia would be off by such a factor. Correct `unit` or "
-        "`scale` of the torque for those logs, or exclude them."
+        f"E-UNIT: {what} is {own:.4g}, that of the {source} {others:.4g}: {ratio:.4g} times. No friction or "
+        "inertia of one rig changes so much: the torque of one of them looks like another unit (mN m, or A "
+        "without its torque constant), and every torque and the inertia would be off by such a factor. Correct "
+        "`unit` or `scale` of the torque for those logs, or exclude them."
     )

@@ -76,7 +76,7 @@ def test_a_clock_that_is_set_back_splits_the_run(protocol: ProtocolName) -> None
 def test_a_clock_that_hardly_runs_is_refused() -> None:
     run = motion()
     for time in (np.zeros(4000), np.floor(run.time * 200.0) / 200.0):
-        with pytest.raises(LogError, match="run: E-CLOCK refuse.*stands still at sample 1, t = 0"):
+        with pytest.raises(LogError, match=r"run: E-CLOCK refuse.*stands still at sample 1, t = 0"):
             screened(replace(run, time=time))
 
 
@@ -192,5 +192,5 @@ def test_positions_in_another_unit_than_the_declared_count_are_refused() -> None
 
 def test_a_torque_far_beyond_its_limit_is_refused() -> None:
     run = motion()
-    with pytest.raises(LogError, match="E-UNIT refuse: the torque reaches.*times the torque limit of 2"):
+    with pytest.raises(LogError, match=r"E-UNIT refuse: the torque reaches.*times the torque limit of 2"):
         screened(replace(run, torque=1000.0 * run.torque), torque_limit=2.0)
