@@ -31,6 +31,8 @@ from data.protocols import IDENTIFIES, ProtocolName
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 IndexArray = NDArray[np.intp]
+# Protocols of which each part of a split run says something by itself.
+TAKEN_APART: Final = frozenset({"breakaway", "constant_velocity", "excitation"})
 FEWEST_SAMPLES: Final = 10
 AT_LIMIT: Final = 0.999  # of a declared torque limit
 FLAT_SAMPLES: Final = 5  # at the largest torque
@@ -397,8 +399,8 @@ def require_torque_size(run: Signals, torque_limit: float | None) -> None:
     raise LogError(
         f"{run.log}: E-UNIT refuse: the torque reaches {size:.4g}, {size / torque_limit:.4g} times the "
         f"torque limit of {torque_limit:g} that [rig] declares: it looks like mN m, or a current without its "
-        "torque constant; every torque and the inertia would be off by such a factor. Correct `unit` or `scale` of "
-        "the torque in [signals], or the limit"
+        "torque constant; every torque and the inertia would be off by such a factor. Correct `unit` or `scale` "
+        "of the torque in [signals], or the limit"
     )
 
 

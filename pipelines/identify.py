@@ -11,6 +11,8 @@ import json
 from collections.abc import Mapping
 from dataclasses import astuple, fields, replace
 
+import numpy as np
+
 from data.recording import Axis
 from ident.advice import advise
 from ident.estimate import IdentifiedRobot
@@ -26,12 +28,14 @@ from pipelines.results.robot_file import write_robot
 from pipelines.settings.loop import LoopDefaults
 
 
-def identify(logs: ReadLogs, *, assumptions: Assumptions = DEFAULT) -> Identification:
+def identify(logs: ReadLogs, *, assumptions: Assumptions = DEFAULT, seed: int = 0) -> Identification:
     """The robot behind the recordings; runs that the campaign excludes are listed with their reason.
+
+    `seed` is that of the report's bootstrap.
 
     Raises `LogError` where the recordings can give no robot at all.
     """
-    found = fit(logs.recordings, assumptions=assumptions)
+    found = fit(logs.recordings, assumptions=assumptions, generator=np.random.default_rng(seed))
     runs = tuple(sorted((*found.robot.runs, *logs.excluded), key=lambda use: use.log))
     return replace(found, robot=replace(found.robot, runs=runs))
 
@@ -66,7 +70,8 @@ def write_identification(
     folder.write_text("table1.tex", table1_tex(document, truth=truth))
     if advised:
         units = {**UNITS[axis], "critical_observer_gain": "1/s"}
-        write_advice(folder, advise(found.evidence, found.weighted), units)
+        advice = () if found.weighted is None else advise(found.evidence, found.weighted)
+        write_advice(folder, advice, units)
     figure = figure2(found.friction_map, robot.robot(), axis=axis, simulated=robot.simulated)
     folder.write_text("figure2.svg", svg_text(figure))
 

@@ -164,7 +164,7 @@ def _identified(
     campaign: Campaign, logs: ReadLogs, folder: ResultFolder, options: RunOptions, progress: Progress
 ) -> tuple[list[str], IdentifiedRobot]:
     tick = progress.stage("identifying", 1)
-    found = identify(logs, assumptions=options.assumptions)
+    found = identify(logs, assumptions=options.assumptions, seed=options.seed)
     tick(1)
     write_identification(
         found,

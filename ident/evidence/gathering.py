@@ -110,8 +110,8 @@ def _without_hunting(
 
 
 def require_evidence(recordings: Sequence[Recording], evidence: Evidence) -> None:
-    """Raise `IdentificationError` where a direction is missing, or the torque's sign or unit is wrong."""
-    _require_directions(recordings, evidence)
+    """Raise `IdentificationError` without a steady run, or where the torque has the wrong sign or unit."""
+    _require_a_direction(recordings, evidence)
     _require_sign(evidence)
     _require_one_unit(evidence)
 
@@ -134,7 +134,7 @@ def run_uses(recordings: Sequence[Recording], evidence: Evidence) -> tuple[RunUs
         if recording.protocol == "set_point":
             why = "a set-point run: the prediction is held against it, nothing is fitted to it"
         elif recording.protocol == "excitation":
-            why = "an excitation run: the friction map does not use it"
+            why = "an excitation run: it is fitted apart from the friction map"
         else:
             nothing = "no start from rest under a ramp was found"
             why = evidence.response_reasons.get(log) or "; ".join(reasons.get(log, [nothing]))
@@ -169,37 +169,29 @@ def _of(recordings: Iterable[Recording], protocol: ProtocolName) -> list[Recordi
     return [recording for recording in recordings if recording.protocol == protocol]
 
 
-def _require_directions(recordings: Sequence[Recording], evidence: Evidence) -> None:
-    for sign, name in ((1, "positive"), (-1, "negative")):
-        if any(run.direction == sign for run in evidence.used_runs):
-            continue
-        seen = sorted({recording.protocol for recording in recordings})
-        logs = sum(recording.protocol == "constant_velocity" for recording in recordings)
-        left_out = [run for run in evidence.runs if run.why is not None and run.velocity * sign > 0]
-        also = (
-            f" {len(left_out)} run(s) that way were left out; the first: {left_out[0].why}"
-            if left_out
-            else ""
-        )
-        raise IdentificationError(
-            f"E-DIRECTION: no usable constant-velocity run with {name} velocity ({logs} constant_velocity "
-            "log(s); "
-            f"protocols seen: {', '.join(seen) or 'none'}).{also} F_c, v_s and b of that direction cannot be "
-            f"told, and the other direction's law is never copied. Record constant speeds with {name} "
-            "velocity, "
-            f"in ratio from slow to fast; they give {IDENTIFIES['constant_velocity']}."
-        )
+def _require_a_direction(recordings: Sequence[Recording], evidence: Evidence) -> None:
+    if evidence.used_runs:
+        return
+    seen = sorted({recording.protocol for recording in recordings})
+    logs = sum(recording.protocol == "constant_velocity" for recording in recordings)
+    left_out = [run for run in evidence.runs if run.why is not None]
+    also = f" {len(left_out)} run(s) were left out; the first: {left_out[0].why}" if left_out else ""
+    raise IdentificationError(
+        f"E-DIRECTION: no usable constant-velocity run in either direction ({logs} constant_velocity log(s); "
+        f"protocols seen: {', '.join(seen) or 'none'}).{also} Record constant speeds with positive and with "
+        f"negative velocity, in ratio from slow to fast; they give {IDENTIFIES['constant_velocity']}."
+    )
 
 
 def _require_sign(evidence: Evidence) -> None:
     against = []
     for sign in (1, -1):
         own = [run.torque * sign for run in evidence.used_runs if run.direction == sign]
-        against.append(sum(own) < 0)
+        against += [sum(own) < 0] if own else []
     if all(against):
         run = evidence.used_runs[0]
         raise IdentificationError(
-            f"E-SIGN: the torque acts against the motion in both directions (for example {run.log}: "
+            f"E-SIGN: the torque acts against the motion in every direction (for example {run.log}: "
             f"{run.torque:.4g} N m at {run.velocity:.4g} rad/s): friction would drive the link. Set `sign = "
             "-1` for "
             "torque or for position in [signals]."
@@ -236,6 +228,6 @@ def _require_same(own: float, others: float, what: str, source: str) -> None:
     raise IdentificationError(
         f"E-UNIT: {what} is {own:.4g}, that of the {source} {others:.4g}: {ratio:.4g} times. No friction or "
         "inertia of one rig changes so much: the torque of one of them looks like another unit (mN m, or A "
-        "without its torque constant), and every torque and the inertia would be off by such a factor. Correct "
-        "`unit` or `scale` of the torque for those logs, or exclude them."
+        "without its torque constant), and all torques and the inertia would be off by such a factor. "
+        "Correct `unit` or `scale` of the torque for those logs, or exclude them."
     )

@@ -58,13 +58,9 @@ def run_spread(residual: FloatArray, travel: FloatArray, variance: FloatArray, p
     largest = float(np.sqrt(np.max(inflated, initial=0.0)))
     spreads = np.concatenate([[0.0], np.geomspace(1e-3, 2.0, SPREADS) * largest])
     wavelengths = np.append(np.geomspace(travel.min(), travel.max(), TRAVELS), np.inf)
-    best, least = RunSpread(0.0, np.inf), np.inf
-    for wavelength in wavelengths:
-        for spread in spreads:
-            candidate = RunSpread(float(spread), float(wavelength))
-            total = variance + candidate.variance(travel)
-            cost = float(np.sum(inflated / total + np.log(total)))
-            cost += EARNED if np.isfinite(wavelength) and spread else 0.0
-            if cost < least:
-                best, least = candidate, cost
-    return best
+    averaged = 1.0 / (1.0 + (travel / wavelengths[:, None]) ** 2)
+    total = variance + averaged[:, None, :] * spreads[:, None] ** 2
+    cost = np.sum(inflated / total + np.log(total), axis=2)
+    cost += EARNED * np.outer(np.isfinite(wavelengths), spreads > 0)
+    wavelength, spread = np.unravel_index(np.argmin(cost), cost.shape)
+    return RunSpread(float(spreads[spread]), float(wavelengths[wavelength]))

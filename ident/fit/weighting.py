@@ -16,16 +16,9 @@ from data.recording import FloatArray
 from ident.evidence.breakaway import Breakaway
 from ident.evidence.gathering import Evidence
 from ident.evidence.momentum import Momentum
-from ident.fit.friction_fit import (
-    DIRECTIONS,
-    SIGN,
-    Direction,
-    FitData,
-    FrictionFit,
-    fit_friction,
-    friction_torque,
-    start_inertia,
-)
+from ident.fit.fit_data import FitData
+from ident.fit.friction_fit import FrictionFit, fit_friction, friction_torque, start_inertia
+from ident.fit.law_model import SIGN, Direction, LawModel
 from ident.fit.variance_model import RunSpread, run_spread, white_variance
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
@@ -47,16 +40,16 @@ class Weighted:
     spread: RunSpread
 
 
-def settle(evidence: Evidence, *, free_beta: bool) -> Weighted:
-    """Fit, weigh anew, and fit again until the weights have settled; from many starts first and last.
+def settle(evidence: Evidence, model: LawModel) -> Weighted:
+    """Fit a model, weigh anew, and fit again until the weights have settled; from many starts first and last.
 
     The steady runs and breakaways settle alone first, and theirs is the spread between runs. The motion joins
     afterwards, with a misfit of its own as seen from their law: however wrong it is, it can neither bend the
     steady runs nor make them look worse than they are.
     """
-    first = _first_data(evidence)
+    first = _first_data(evidence, model)
     inertia = _known_inertia(evidence, first)
-    alone = _settle_steady(evidence, first, inertia=inertia, free_beta=free_beta)
+    alone = _settle_steady(evidence, first, inertia=inertia)
     if not evidence.momenta or inertia is None:
         return alone
     spread = alone.spread
@@ -65,20 +58,18 @@ def settle(evidence: Evidence, *, free_beta: bool) -> Weighted:
     data = first
     for number in range(MOST_ROUNDS):
         data = reweighted(evidence, data, fit, spread)
-        again = fit_friction(data, free_beta=free_beta, start=fit)
+        again = fit_friction(data, start=fit)
         change = _change(fit, again)
         fit = again
         if number >= 1 and change < SETTLED:
             break
-    fit = fit_friction(data, free_beta=free_beta, start=None)
+    fit = fit_friction(data)
     return Weighted(data, fit, spread)
 
 
-def with_inertia(
-    evidence: Evidence, weighted: Weighted, inertia: tuple[float, float], *, free_beta: bool
-) -> Weighted:
+def with_inertia(evidence: Evidence, weighted: Weighted, inertia: tuple[float, float]) -> Weighted:
     """The settled fit with one datum more: an inertia and its standard error."""
-    torque = _first_data(evidence)
+    torque = _first_data(evidence, weighted.data.model)
     data = replace(
         weighted.data,
         inertia=inertia,
@@ -86,27 +77,27 @@ def with_inertia(
         acceleration=torque.acceleration,
     )
     fit = replace(weighted.fit, values={**weighted.fit.values, "inertia": inertia[0]})
-    fit = fit_friction(data, free_beta=free_beta, start=fit)
+    fit = fit_friction(data, start=fit)
     for _ in range(2):
         data = reweighted(evidence, data, fit, weighted.spread)
-        fit = fit_friction(data, free_beta=free_beta, start=fit)
+        fit = fit_friction(data, start=fit)
     return Weighted(data, replace(fit, other_minimum=weighted.fit.other_minimum), weighted.spread)
 
 
-def _settle_steady(evidence: Evidence, first: FitData, *, inertia: float | None, free_beta: bool) -> Weighted:
+def _settle_steady(evidence: Evidence, first: FitData, *, inertia: float | None) -> Weighted:
     """The fit of steady runs and breakaways; what their speed still changes is taken off with `inertia`.
 
     Where no inertia is known, that small term stays in.
     """
     torque = first.torque - (inertia or 0.0) * first.acceleration
     data = replace(first, torque=torque, acceleration=np.zeros_like(torque), momenta=(), whitening=())
-    fit = fit_friction(data, free_beta=False)
+    fit = fit_friction(replace(data, model=replace(data.model, free_shape=())))
     spread = RunSpread(0.0, np.inf)
     for number in range(ROUNDS):
         seen = replace(fit, values={**fit.values, "inertia": inertia or 0.0})
         spread = _spread_of(evidence, data, seen)
         data = reweighted(evidence, data, seen, spread)
-        fit = fit_friction(data, free_beta=free_beta, start=None if number == ROUNDS - 1 else fit)
+        fit = fit_friction(data, start=None if number == ROUNDS - 1 else fit)
     return Weighted(data, fit, spread)
 
 
@@ -134,20 +125,20 @@ def _change(fit: FrictionFit, again: FrictionFit) -> float:
     return float(np.max(np.abs(change) / np.sqrt(np.diag(again.covariance))))
 
 
-def fitted_robot(fit: FrictionFit, lines: Sequence[Direction] = ()) -> OneLinkRobot | None:
-    """The robot of a fit, where its values are a robot's; without Stribeck effect where its law is a line."""
-    curves = {}
+def _robot_one_way(fit: FrictionFit, direction: Direction) -> OneLinkRobot | None:
+    """A robot with the law of a direction both ways, where its values are a robot's; without Stribeck effect
+    where its law is a line.
+    """
+    coulomb, stribeck, velocity, damping, shape = fit.law(direction)
+    stribeck = 0.0 if fit.model.law_of(direction) in fit.model.lines else stribeck
     try:
-        for direction in DIRECTIONS:
-            coulomb, stribeck, velocity, damping, shape = fit.law(direction)
-            stribeck = 0.0 if direction in lines else stribeck
-            curves[direction] = StribeckCurve(coulomb + stribeck, coulomb, velocity, damping, shape)
-        return OneLinkRobot(fit.values["inertia"], StribeckFriction(**curves))
+        curve = StribeckCurve(coulomb + stribeck, coulomb, velocity, damping, shape)
+        return OneLinkRobot(fit.values["inertia"], StribeckFriction(curve, curve))
     except ModelError:
         return None
 
 
-def _first_data(evidence: Evidence) -> FitData:
+def _first_data(evidence: Evidence, model: LawModel) -> FitData:
     runs, starts = evidence.used_runs, evidence.used_starts
     run_direction = np.array([run.direction for run in runs], dtype=np.int64)
     start_direction = np.array([start.direction for start in starts], dtype=np.int64)
@@ -156,6 +147,7 @@ def _first_data(evidence: Evidence) -> FitData:
     typical = FIRST_SPREAD * float(np.median(np.abs(torque)))
     line = np.array([start.line.stderr for start in starts])
     return FitData(
+        model=model,
         run_direction=run_direction,
         speed=np.array([abs(run.velocity) for run in runs]),
         torque=torque,
@@ -191,7 +183,7 @@ def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: RunS
     """The data with onsets and standard errors as a fit and the spread between runs make them."""
     runs, starts = evidence.used_runs, evidence.used_starts
     travel = np.array([run.travel for run in runs])
-    start_torque, delay_error = _onset_torque(starts, fit, data.lines)
+    start_torque, delay_error = _onset_torque(starts, fit)
     line = np.array([np.hypot(start.line.stderr, start.place_stderr) for start in starts])
     line = np.hypot(line, delay_error)
     place = _place_spread(data, fit, start_torque, line, spread)
@@ -210,7 +202,7 @@ def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: RunS
 def _run_residuals(data: FitData, fit: FrictionFit) -> FloatArray:
     """Torque less the law's (n,) [N m]."""
     residual = np.zeros_like(data.torque)
-    for direction in DIRECTIONS:
+    for direction in data.model.directions:
         own = data.run_direction == SIGN[direction]
         predicted = friction_torque(fit.law(direction), data.speed[own])
         residual[own] = data.torque[own] - predicted - fit.values["inertia"] * data.acceleration[own]
@@ -220,7 +212,7 @@ def _run_residuals(data: FitData, fit: FrictionFit) -> FloatArray:
 def _slopes(data: FitData, fit: FrictionFit) -> FloatArray:
     """The law's slope at each run (n,) [N m s/rad]."""
     slope = np.zeros_like(data.torque)
-    for direction in DIRECTIONS:
+    for direction in data.model.directions:
         own = data.run_direction == SIGN[direction]
         law, speed = fit.law(direction), data.speed[own]
         step = 1e-4 * speed
@@ -228,17 +220,16 @@ def _slopes(data: FitData, fit: FrictionFit) -> FloatArray:
     return slope
 
 
-def _onset_torque(
-    starts: Sequence[Breakaway], fit: FrictionFit, lines: Sequence[Direction]
-) -> tuple[FloatArray, FloatArray]:
+def _onset_torque(starts: Sequence[Breakaway], fit: FrictionFit) -> tuple[FloatArray, FloatArray]:
     """Torque at the onset (m,) [N m], magnitudes, and the error that the delay may bring (m,)."""
-    robot = fitted_robot(fit, lines)
+    robots = {direction: _robot_one_way(fit, direction) for direction in fit.model.directions}
     torque, error = np.zeros(len(starts)), np.zeros(len(starts))
     for number, start in enumerate(starts):
         rate, torque[number] = abs(start.line.rate), abs(start.torque)
+        direction: Direction = "positive" if start.direction > 0 else "negative"
+        robot = robots[direction]
         if robot is None:
             continue
-        direction: Direction = "positive" if start.direction > 0 else "negative"
         delays = [
             breakaway_delay(robot, direction=direction, ramp_rate=rate, travel=start.travel + off)
             for off in (-start.travel_stderr, 0.0, start.travel_stderr)
@@ -253,7 +244,7 @@ def _place_spread(
 ) -> float:
     """Variance of F_s from place to place [(N m)^2], pooled over directions and with the runs' spread."""
     excess, degrees = PRIOR_STARTS * spread.spread**2, PRIOR_STARTS
-    for direction in DIRECTIONS:
+    for direction in data.model.directions:
         own = data.start_direction == SIGN[direction]
         if np.count_nonzero(own) < 2:
             continue

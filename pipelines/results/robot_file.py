@@ -7,6 +7,10 @@ whether it was used and why not, `notes` the findings. Beside these, for the que
 - `axis` ("rotary" or "linear") and `simulated` (the logs came from a virtual rig);
 - `covariance`: `{"names": ["inertia", "positive.static_torque", ...], "matrix": [[...]]}`, the joint
   covariance of the free parameters in the units of their product, from which prediction intervals are drawn;
+  where one law for both directions was fitted its names are "mean.static_torque", ..., "torque_offset";
+- `profiles`: by name as in `covariance`, and for those of `mean`, `{"value": [...], "rise": [...]}`: points
+  of the profile likelihood, from low values to high, and the rise of chi-square over its least, all other
+  parameters refitted. A 95 % interval ends where it has risen by the square of Student's quantile;
 - `inertia_sources`: the inertia by each protocol that gave one;
 - `campaign`: `{"name", "rig", "loop"}`, where `loop` holds the gains, the sampling and the compensator of the
   campaign's set-point runs, so far as one value holds for all of them, else null.
@@ -28,7 +32,14 @@ import numpy as np
 from pydantic import ValidationError
 
 from data.findings import Finding
-from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate, IdentifiedRobot, RunUse
+from ident.estimate import (
+    CURVE_PARAMETERS,
+    Covariance,
+    Estimate,
+    IdentifiedRobot,
+    ProfilePoints,
+    RunUse,
+)
 from ident.model import published
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
@@ -96,8 +107,7 @@ class RobotFile:
 def withheld_parameters(robot: IdentifiedRobot) -> list[str]:
     """A sentence for each parameter that the robot needs and that is withheld."""
     entries = {"inertia": robot.inertia}
-    entries |= {f"positive.{name}": robot.positive[name] for name in CURVE_PARAMETERS}
-    entries |= {f"negative.{name}": robot.negative[name] for name in CURVE_PARAMETERS}
+    entries |= {f"{key}.{name}": law[name] for key, law in robot.laws().items() for name in CURVE_PARAMETERS}
     return [f"{name} is withheld: {entry.withheld}" for name, entry in entries.items() if entry.value is None]
 
 
@@ -152,6 +162,7 @@ def write_robot(folder: ResultFolder, robot: IdentifiedRobot, loop: LoopDefaults
         "torque_offset": robot.torque_offset,
         "inertia_sources": robot.inertia_sources,
         "covariance": {"names": robot.covariance.names, "matrix": robot.covariance.matrix},
+        "profiles": robot.profiles,
         "campaign": {"name": folder.owner.campaign, "rig": folder.owner.rig, "loop": loop},
         "runs": robot.runs,
         "notes": robot.notes,
@@ -205,6 +216,10 @@ def _identified(document: RobotDocument, path: Path) -> IdentifiedRobot:
         notes=tuple(Finding(**note.model_dump()) for note in document.notes),
         covariance=Covariance(names, matrix),
         inertia_sources={name: _estimate(entry) for name, entry in document.inertia_sources.items()},
+        profiles={
+            name: ProfilePoints(np.array(entry.value), np.array(entry.rise))
+            for name, entry in document.profiles.items()
+        },
         axis=document.axis,
         simulated=document.simulated,
     )

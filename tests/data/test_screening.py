@@ -59,7 +59,7 @@ def test_a_stick_and_a_sudden_breakaway_are_no_fault() -> None:
     assert got.findings == ()
 
 
-@pytest.mark.parametrize("protocol", ["constant_velocity", "excitation"])
+@pytest.mark.parametrize("protocol", ["constant_velocity", "frequency_response"])
 def test_a_clock_that_is_set_back_splits_the_run(protocol: ProtocolName) -> None:
     run = replace(motion(), protocol=protocol)
     time = run.time.copy()

@@ -173,10 +173,20 @@ def test_the_covariance_is_in_the_laws_own_parameters() -> None:
     assert len(robot.draws(5, generator)) == 5
 
 
-def test_a_missing_direction_is_refused_and_never_copied() -> None:
+def test_a_missing_direction_is_withheld_and_never_copied() -> None:
     rig, generator = RIGS["bench"], np.random.default_rng(15)
-    with pytest.raises(IdentificationError, match=r"E-DIRECTION: .*negative velocity"):
-        identify(_speeds(rig, generator, (1,)))
+    found = identify([*_speeds(rig, generator, (1,)), *_ramps(rig, generator)])
+    robot = found.robot
+    assert robot.robot() is None
+    for name in CURVE_PARAMETERS:
+        assert str(robot.negative[name].withheld).startswith("E-DIRECTION: no usable constant-velocity run")
+        assert robot.mean[name].value is None
+    for name, truth in vars(rig.robot.friction.positive).items():
+        assert robot.positive[name].value == pytest.approx(truth, rel=TOLERANCE.get(name, 1e-9)), name
+    assert robot.inertia.value == pytest.approx(rig.robot.inertia, rel=0.02)
+    backward = [point for point in found.friction_map if point.direction < 0]
+    assert backward
+    assert not any(point.used for point in backward)
 
 
 def test_nothing_to_identify_is_refused() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from data.recording import Recording
 from ident.evidence.breakaway import breakaways
-from ident.fit.friction_fit import Direction
+from ident.fit.law_model import Direction
 from ident.response import breakaway_delay
 from tests.ident.rigs import Rig
 
