@@ -47,9 +47,6 @@ PILED_UP: Final = 4.0  # times as often at the largest torque as right below it
 SIGN_BLOCKS: Final = 8  # of a run, by whose scatter its mean work is judged
 FAR_BEYOND: Final = 3.0  # times the torque limit
 GAP: Final = 3.0  # median steps
-TAKEN_APART: Final = frozenset(
-    {"breakaway", "constant_velocity"}
-)  # protocols of which each part says its own
 _YEARS: Final = 1e8  # [s] between two samples of no run
 _SPIKE_WINDOW: Final = 25  # samples on either side for the local spread
 _LOOKS_LIKE: Final = (
