@@ -396,8 +396,8 @@ def require_torque_size(run: Signals, torque_limit: float | None) -> None:
     raise LogError(
         f"{run.log}: E-UNIT refuse: the torque reaches {size:.4g}, {size / torque_limit:.4g} times the "
         f"torque limit of {torque_limit:g} that [rig] declares: it looks like mN m, or a current without its "
-        "torque constant; every torque and the inertia would be off by such a factor. Correct `unit` or `scale` "
-        "of the torque in [signals], or the limit"
+        "torque constant; every torque and the inertia would be off by such a factor. Correct `unit` or "
+        "`scale` of the torque in [signals], or the limit"
     )
 
 

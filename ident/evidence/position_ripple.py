@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from data.recording import FloatArray, Recording
 from ident.evidence.friction_map import SteadyRun
+from ident.evidence.wave_sums import wave_sums
 
 BLOCKS = 300  # a run, at most
 LEAST_BLOCKS = 24
@@ -219,9 +220,10 @@ def _sums(own: Trace, grid: FloatArray, noise: float) -> Sums:
     seen = grid * own.stride < FINEST
     right, left = np.zeros((grid.size, 2)), np.zeros((grid.size, 2, 2))
     if noise > 0 and np.any(seen):
-        waves = own.waves(grid[seen])
-        right[seen] = np.einsum("mxw,m->wx", waves, own.torque) / noise
-        left[seen] = np.einsum("mxw,myw->wxy", waves, waves, optimize=True) / noise
+        sums = wave_sums(
+            grid[seen], position=own.position, torque=own.torque, smooth=own.smooth, stride=own.stride
+        )
+        right[seen], left[seen] = (each / noise for each in sums)
     return right, left
 
 
