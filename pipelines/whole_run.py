@@ -45,7 +45,7 @@ from pipelines.settings.gains import (
 )
 from pipelines.settings.loop import LawChoice
 
-PICTURES = ("figure2", "figure4", "figure6", "figure7", "figure8", "figure9", "figure10")
+PICTURES = ("figure2", "validation", "figure4", "figure6", "figure7", "figure8", "figure9", "figure10")
 SWEEP_POINTS = 101
 
 

@@ -142,6 +142,11 @@ def run_uses(recordings: Sequence[Recording], evidence: Evidence) -> tuple[RunUs
     return tuple(uses)
 
 
+def log_findings(recordings: Sequence[Recording]) -> list[Finding]:
+    """What the reader and the screening saw."""
+    return [finding for recording in recordings for finding in recording.findings]
+
+
 def run_findings(evidence: Evidence) -> tuple[Finding, ...]:
     """A finding for each run or start that is left out under a code."""
     found = []

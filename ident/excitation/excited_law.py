@@ -47,7 +47,7 @@ class ExcitedLaw:
     law: Law
     values: Mapping[str, float]  # by the names of `ident.excitation.inverse_dynamics`
     names: tuple[str, ...]  # of the covariance
-    covariance: FloatArray  # (p, p)
+    covariance: FloatArray  # (p, p) [product of the parameters' units]
     dof: int
     terms: FrictionTerms
     cutoff: float  # [Hz]
@@ -74,6 +74,8 @@ def excited_law(recordings: Sequence[Recording], *, law: Law, axis: Axis) -> Exc
     pieces, unused = _alike(recordings)
     if not pieces:
         return "no log has an unbroken stretch of 64 samples"
+    if not any(np.any(piece.torque) for piece in pieces):
+        return "the torque is zero throughout: nothing was asked of the link, or another signal was read"
     terms = FrictionTerms(law)
     cutoff = cutoff_frequency(pieces, terms=terms, timing="measured")
     if axis == "rotary" and max(np.ptp(piece.position) for piece in pieces) > TURNED:

@@ -54,7 +54,7 @@ class Motion:
 
     position: FloatArray  # [rad]
     rate: FloatArray  # [rad/s], what stands where a term is linear in the speed; it may be noisy
-    direction: FloatArray  # +1 or -1
+    direction: FloatArray  # (n,) +1 or -1 [-]
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Equation:
     torque: FloatArray  # (m,) [N m]
     acceleration: FloatArray  # (m,) [rad/s^2]
     motion: Motion
-    weight: FloatArray  # (n,) 0 where the equation does not hold, else 1
+    weight: FloatArray  # (n,) [-], 0 where the equation does not hold, else 1
 
     def filtered(self, signal: FloatArray) -> FloatArray:
         """A signal of the span (n,) through both filters and the weight, at the instants kept (m,)."""

@@ -41,7 +41,7 @@ class Comparison:
     """The fit by instruments, and how far least squares lies from it, in errors of the difference (p,)."""
 
     fit: LinearFit
-    distance: FloatArray
+    distance: FloatArray  # (p,) in standard errors [-]
 
     @property
     def bent(self) -> bool:

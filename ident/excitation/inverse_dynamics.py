@@ -74,7 +74,7 @@ class System:
     """The linear equations of all spans: torque (m,) = columns (m, p) @ parameters (p,)."""
 
     names: tuple[str, ...]
-    columns: FloatArray  # (m, p)
+    columns: FloatArray  # (m, p) [N m over the parameter]
     torque: FloatArray  # (m,) [N m]
     span: NDArray[np.intp]  # (m,) number of the span
 
@@ -88,11 +88,11 @@ class LinearFit:
     """Least squares of a `System`."""
 
     names: tuple[str, ...]
-    values: FloatArray  # (p,)
-    covariance: FloatArray  # (p, p), robust
+    values: FloatArray  # (p,) [SI]
+    covariance: FloatArray  # (p, p) [SI], robust
     dof: int  # of Student's t for value over error
     residual: FloatArray  # (m,) [N m]
-    relative_error: float  # norm of the residual over that of the torque
+    relative_error: float  # [-] norm of the residual over that of the torque
 
     def value(self, name: str) -> float:
         """A parameter."""

@@ -64,7 +64,7 @@ class OutputError:
 
     values: Mapping[str, float]
     names: tuple[str, ...]  # free parameters
-    covariance: FloatArray  # (p, p), from the windows' scores
+    covariance: FloatArray  # (p, p) [SI], from the windows' scores
     dof: int
     error: float  # root mean square of position, predicted over a window [rad]
     report: str

@@ -12,6 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from data.recording import FloatArray, Recording
 from data.screening import GAP
@@ -25,7 +26,6 @@ class Span:
     """Evenly sampled signals (n,) without a gap."""
 
     log: str
-    start_time: float  # [s]
     period: float  # h [s]
     position: FloatArray  # [rad]
     torque: FloatArray  # [N m]
@@ -56,13 +56,11 @@ def _span(recording: Recording, first: int, past: int, period: float) -> Span:
     own = float(time[-1] - time[0]) / (time.size - 1)  # a clock may drift; a span has its own mean step
     even = time[0] + own * np.arange(time.size)
     if np.max(np.abs(time - even)) > JITTER * period:
-        position = np.interp(even, time, position)
+        position = np.asarray(CubicSpline(time, position)(even))  # a line between samples has no acceleration
         torque = np.interp(even, time, torque)
         reference = None if reference is None else np.interp(even, time, reference)
         saturated = np.interp(even, time, saturated.astype(np.float64)) > 0.0
-    return Span(
-        recording.log, float(time[0]), own, position, torque, reference, saturated, recording.resolution
-    )
+    return Span(recording.log, own, position, torque, reference, saturated, recording.resolution)
 
 
 def _saturated(recording: Recording) -> NDArray[np.bool_]:

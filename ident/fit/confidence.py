@@ -33,9 +33,9 @@ class Interval:
     high: float | None
 
 
-def quantile(dof: int) -> float:
+def quantile(dof: float) -> float:
     """Two-sided 95 % quantile of Student's t with so many degrees of freedom, at least one."""
-    return float(student.ppf(0.5 + 0.5 * LEVEL, max(dof, 1)))
+    return float(student.ppf(0.5 + 0.5 * LEVEL, max(dof, 1.0)))
 
 
 def symmetric(value: float, stderr: float, dof: int, *, least: float | None = None) -> Interval:

@@ -17,7 +17,7 @@ writes the report.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import lmfit
@@ -88,6 +88,32 @@ def residuals(data: FitData, values: Mapping[str, float]) -> FloatArray:
     if data.inertia is not None:
         parts.append(np.array([(inertia - data.inertia[0]) / data.inertia[1]]))
     return np.concatenate(parts)
+
+
+def in_order(
+    data: FitData, *, runs: FloatArray, starts: FloatArray, motion: float = 0.0, inertia: float = 0.0
+) -> FloatArray:
+    """What belongs to each run (n,) and each breakaway (m,), in the order of `residuals`."""
+    parts: list[FloatArray] = []
+    for direction in data.model.directions:
+        parts.append(runs[data.run_direction == SIGN[direction]])
+        parts.append(starts[data.start_direction == SIGN[direction]])
+        parts += [np.full(one.gain.size, motion) for one in data.momenta if one.direction == SIGN[direction]]
+    if data.inertia is not None:
+        parts.append(np.array([inertia]))
+    return np.concatenate(parts)
+
+
+def jacobian(data: FitData, values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
+    """Slope of the residuals with the free parameters (N, p) [1/SI], by central differences."""
+    columns = []
+    for name in free:
+        step = 1e-6 * max(abs(values[name]), 1e-9 * max(values.values()))
+        if name.endswith("stribeck_velocity"):
+            step = 1e-6 * values[name]
+        ahead, behind = (residuals(data, {**values, name: values[name] + off}) for off in (step, -step))
+        columns.append((ahead - behind) / (2 * step))
+    return np.column_stack(columns)
 
 
 def fit_friction(data: FitData, *, start: FrictionFit | None = None) -> FrictionFit:
@@ -225,10 +251,11 @@ def _covariance(data: FitData, x: FloatArray) -> FloatArray:
 
 def _starts(data: FitData) -> FloatArray:
     """Starts from the linear problem on a grid of v_s: the local minima first, then the rest spread out."""
-    ranked = [_ranked(data, law) for law in data.model.laws]
+    blank = _blank(data)
+    ranked = [_ranked(data, law, blank) for law in data.model.laws]
     starts = []
     for number in range(STARTS):
-        x = _blank(data)
+        x = blank.copy()
         for law, choices in zip(data.model.laws, ranked, strict=True):
             place = data.model.place(law)
             x[place : place + len(BLOCK)] = choices[number % len(choices)]
@@ -246,7 +273,7 @@ def _blank(data: FitData) -> FloatArray:
     return x
 
 
-def _ranked(data: FitData, law: LawName) -> list[FloatArray]:
+def _ranked(data: FitData, law: LawName, blank: FloatArray) -> list[FloatArray]:
     """Blocks of one law: the best linear law of runs and breakaways for each v_s, best minima first."""
     place = data.model.place(law)
     velocity = place + BLOCK.index("stribeck_velocity")
@@ -254,7 +281,7 @@ def _ranked(data: FitData, law: LawName) -> list[FloatArray]:
     moving = data.speed[own]
     steady = replace(data, momenta=(), whitening=())
     largest = float(np.max(np.abs(data.torque[own])))
-    points = np.tile(_blank(data), (GRID, 1))
+    points = np.tile(blank, (GRID, 1))
     points[:, place] = points[:, place + 1] = 0.5 * largest
     points[:, velocity] = np.linspace(np.log(0.3 * moving.min()), np.log(2.0 * moving.max()), GRID)
     free = np.zeros(points.shape[1], dtype=np.bool_)

@@ -20,13 +20,16 @@ from ident.estimate import Estimate
 from ident.evidence.frequency_response import LEAST_SPEED_RATIO, FrequencyInertia
 from ident.evidence.gathering import Evidence
 from ident.fit.assumptions import Assumptions
+from ident.fit.censoring import with_bounds
 from ident.fit.confidence import quantile
 from ident.fit.friction_fit import polished
 from ident.fit.law_model import DIRECTIONS, Direction, LawModel, LawName
 from ident.fit.law_shape import chosen_shape, shape_findings
 from ident.fit.missing_direction import Missing, missing_directions, of_directions
 from ident.fit.parameters import UNITS, Parameters, parameters
+from ident.fit.ramp_rates import trend_finding
 from ident.fit.second_minimum import minimum_findings, without_disputed
+from ident.fit.small_samples import certainty
 from ident.fit.stribeck_effect import where_it_shows
 from ident.fit.weighting import Weighted, settle, with_inertia
 from ident.fit.withholding import require_enough
@@ -71,15 +74,16 @@ def explain(evidence: Evidence, *, axis: Axis, assumptions: Assumptions) -> Expl
             findings.append(refusal)
         else:
             datum = (evidence.response.inertia, evidence.response.stderr)
-            weighted = with_inertia(evidence, weighted, datum)
+            weighted = with_inertia(evidence, weighted, datum, dof=evidence.response.dof)
         findings += _disagreement(sources, unit)
     fit, report = polished(weighted.data, weighted.fit)
-    dof = _degrees(weighted)
-    values = parameters(weighted.data, fit, axis=axis, dof=dof, missing=missing.reasons)
+    values = parameters(weighted.data, fit, axis=axis, missing=missing.reasons)
     weighted = replace(weighted, fit=values.fit)
-    values = without_disputed(values)
+    values = with_bounds(without_disputed(values), evidence)
     findings += shape_findings(weighted) if assumptions.shape == "fixed" else []
     findings += [] if choice is None else [choice.finding]
+    if weighted.data.trend is not None:
+        findings.append(trend_finding(weighted.data.trend, unit=UNITS[axis]["static_torque"]))
     findings += [*values.findings, *minimum_findings(values), *_offset_finding(values, axis)]
     report = report if choice is None else f"{report}\n\n{choice.table}"
     return Explained(evidence, weighted, values, sources, report, tuple(findings))
@@ -96,19 +100,14 @@ def _model(assumptions: Assumptions, missing: Missing) -> LawModel:
 def _inertia_of(weighted: Weighted, unit: str) -> Estimate:
     """The inertia of a fit with the interval of its standard error."""
     value = weighted.fit.values["inertia"]
+    found = certainty(weighted.data, weighted.fit)
+    own = np.array([float(name == "inertia") for name in weighted.fit.free])
     place = weighted.fit.free.index("inertia")
-    error = float(np.sqrt(weighted.fit.covariance[place, place]))
+    error = float(np.sqrt(found.covariance[place, place]))
     if not (value > 0 and np.isfinite(error)):
         return Estimate(None, unit, withheld="E-BOUND: the inertia ended at its bound 0; record a multisine.")
-    reach = quantile(_degrees(weighted)) * error
+    reach = quantile(found.dof(own)) * error
     return Estimate(value, unit, error, (max(value - reach, 0.0), value + reach))
-
-
-def _degrees(weighted: Weighted) -> int:
-    """Data beyond the free parameters: runs, breakaways, and one datum a ramp's motion."""
-    data = weighted.data
-    friction = sum(name != "inertia" for name in weighted.fit.free)
-    return max(data.torque.size + data.start_torque.size - friction, 1)
 
 
 def _response_source(

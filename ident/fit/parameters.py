@@ -10,11 +10,13 @@ import numpy as np
 from data.findings import Finding
 from data.recording import Axis, FloatArray
 from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate, ProfilePoints
-from ident.fit.confidence import Interval
+from ident.fit.confidence import Interval, quantile
 from ident.fit.fit_data import FitData
 from ident.fit.friction_fit import FrictionFit
 from ident.fit.law_model import COMMON, DIRECTIONS, Direction, LawName
 from ident.fit.profiles import Combination, Profile, law_combinations, profiles
+from ident.fit.small_samples import certainty
+from ident.fit.unseen_effect import with_unseen_effect
 from ident.fit.withholding import withheld
 
 UNITS: Mapping[Axis, Mapping[str, str]] = {
@@ -65,12 +67,21 @@ def parameters(
     fit: FrictionFit,
     *,
     axis: Axis,
-    dof: int,
     missing: Mapping[Direction, str] | None = None,
 ) -> Parameters:
     """Values, errors and intervals in the law's own parameters; `missing`: why a direction has no law."""
-    fit, found = profiles(data, fit, combinations(fit), dof=dof)
-    names, matrix, stderr = _physical_covariance(fit)
+    known = certainty(data, fit)
+
+    def height(combination: Combination) -> float:
+        own = np.array([combination.get(name, 0.0) for name in fit.free])
+        return quantile(known.dof(own)) ** 2 * known.inflation(own)
+
+    wanted = combinations(fit)
+    better, found = profiles(data, fit, wanted, height=height)
+    found = with_unseen_effect(data, found, wanted, height=height)
+    if better is not fit:
+        fit, known = better, certainty(data, better)
+    names, matrix, stderr = _physical_covariance(fit, known.covariance)
     units = UNITS[axis]
     findings: list[Finding] = []
     laws: dict[LawName, Mapping[str, Estimate]] = {}
@@ -111,9 +122,11 @@ def combinations(fit: FrictionFit) -> dict[str, Combination]:
     return {name: combination for name, combination in wanted.items() if felt.issuperset(combination)}
 
 
-def _physical_covariance(fit: FrictionFit) -> tuple[tuple[str, ...], FloatArray, dict[str, float]]:
+def _physical_covariance(
+    fit: FrictionFit, covariance: FloatArray
+) -> tuple[tuple[str, ...], FloatArray, dict[str, float]]:
     """Names 'inertia', 'positive.static_torque', ..., their covariance with F_s = F_c + dF, and standard
-    errors.
+    errors, from the covariance of the free parameters.
 
     A parameter that the data do not feel has an infinite error and no place in the covariance.
     """
@@ -128,8 +141,8 @@ def _physical_covariance(fit: FrictionFit) -> tuple[tuple[str, ...], FloatArray,
             transform[row, fit.free.index(f"{law}_coulomb_torque")] = 1.0
             parameter = "static_torque"
         names.append(f"{law}.{parameter}")
-    lost = np.isinf(np.diag(fit.covariance))
-    matrix = np.asarray(transform @ np.where(np.isinf(fit.covariance), 0.0, fit.covariance) @ transform.T)
+    lost = np.isinf(np.diag(covariance))
+    matrix = np.asarray(transform @ np.where(np.isinf(covariance), 0.0, covariance) @ transform.T)
     spread = np.where(lost, np.inf, np.sqrt(np.diag(matrix)))
     kept = tuple(name for name, gone in zip(names, lost, strict=True) if not gone)
     return kept, matrix[np.ix_(~lost, ~lost)], dict(zip(names, map(float, spread), strict=True))

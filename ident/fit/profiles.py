@@ -9,14 +9,14 @@ first to a bound that the law itself has (F_c, b, J at 0), that bound is the end
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from data.recording import FloatArray
 from ident.estimate import ProfilePoints
-from ident.fit.confidence import Interval, quantile
+from ident.fit.confidence import Interval
 from ident.fit.fit_data import FitData
 from ident.fit.friction_fit import FrictionFit, fit_friction, vector
 from ident.fit.law_model import BLOCK, LawName
@@ -42,16 +42,22 @@ def law_combinations(law: LawName) -> dict[str, Combination]:
 
 
 def profiles(
-    data: FitData, fit: FrictionFit, wanted: Mapping[str, Combination], *, dof: int
+    data: FitData,
+    fit: FrictionFit,
+    wanted: Mapping[str, Combination],
+    *,
+    height: Callable[[Combination], float],
 ) -> tuple[FrictionFit, dict[str, Profile]]:
     """Profiles of combinations whose parameters are all free; by name, with the fit that they belong to.
+
+    `height` says by how much chi-square rises at the ends of a combination's interval.
 
     That is the fit given, or a better one where a profile has led to it.
     """
     for _ in range(TRIALS):
         found: dict[str, Profile] = {}
         for name, combination in wanted.items():
-            profile, better = _profile(data, fit, combination, dof=dof)
+            profile, better = _profile(data, fit, combination, height=height(combination))
             if better is not None:
                 fit = better
                 break
@@ -62,13 +68,13 @@ def profiles(
 
 
 def _profile(
-    data: FitData, fit: FrictionFit, combination: Combination, *, dof: int
+    data: FitData, fit: FrictionFit, combination: Combination, *, height: float
 ) -> tuple[Profile, FrictionFit | None]:
+    """The profile, and the better fit that it has led to, if it has."""
     problem, box, work = data.problem, data.box, data.work
     best, cost = vector(data, fit.values)[None, :], np.zeros(1)
     refit_each(problem, best, box, work, cost)
     problem.combination[:] = [combination.get(name, 0.0) for name in data.model.names]
-    height = quantile(dof) ** 2
     centre = _value(data, best[0], combination)
     step = np.sqrt(height) * _stderr(fit, combination)
     effect = {name: share for name, share in combination.items() if name.endswith("stribeck_torque")}

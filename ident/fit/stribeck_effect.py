@@ -22,6 +22,7 @@ from ident.evidence.gathering import Evidence
 from ident.fit.confidence import quantile
 from ident.fit.friction_fit import fit_friction
 from ident.fit.law_model import LawName
+from ident.fit.small_samples import certainty
 from ident.fit.weighting import Weighted, reweighted
 
 EARNED = 6.0  # fall of chi-square by which a curve has to beat the line
@@ -55,7 +56,7 @@ def _line_if_as_good(evidence: Evidence, weighted: Weighted, law: LawName) -> We
         data = reweighted(evidence, data, fit, weighted.spread)
         fit = fit_friction(data, start=fit)
     where = fit.free.index(f"{law}_stribeck_torque")
-    error = float(np.sqrt(fit.covariance[where, where]))
-    dof = data.torque.size + data.start_torque.size - len(fit.free)
-    seen = np.isfinite(error) and fit.values[f"{law}_stribeck_torque"] > quantile(dof) * error
+    found, own = certainty(data, fit), np.eye(len(fit.free))[where]
+    reach = quantile(found.dof(own)) * float(np.sqrt(found.covariance[where, where]))
+    seen = np.isfinite(reach) and fit.values[f"{law}_stribeck_torque"] > reach
     return weighted if seen else Weighted(data, fit, weighted.spread)

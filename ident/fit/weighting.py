@@ -17,9 +17,18 @@ from ident.evidence.breakaway import Breakaway
 from ident.evidence.gathering import Evidence
 from ident.evidence.momentum import Momentum
 from ident.fit.fit_data import FitData
-from ident.fit.friction_fit import FrictionFit, fit_friction, friction_torque, start_inertia
+from ident.fit.friction_fit import (
+    FrictionFit,
+    fit_friction,
+    friction_torque,
+    in_order,
+    jacobian,
+    residuals,
+    start_inertia,
+)
 from ident.fit.law_model import SIGN, Direction, LawModel
-from ident.fit.variance_model import RunSpread, run_spread, white_variance
+from ident.fit.ramp_rates import rate_trend
+from ident.fit.variance_model import Spread, averaged_out, members, spread_of, white_variance
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
 from ident.response import breakaway_delay
@@ -28,7 +37,6 @@ ROUNDS = 5  # of the steady runs alone
 MOST_ROUNDS = 12  # with the motion
 SETTLED = 0.02  # standard errors by which a round may still move the fit
 FIRST_SPREAD = 0.01  # of the torque, before anything is known
-PRIOR_STARTS = 4.0  # breakaways that the runs' spread is worth
 
 
 @dataclass(frozen=True)
@@ -37,7 +45,7 @@ class Weighted:
 
     data: FitData
     fit: FrictionFit
-    spread: RunSpread
+    spread: Spread
 
 
 def settle(evidence: Evidence, model: LawModel) -> Weighted:
@@ -67,12 +75,15 @@ def settle(evidence: Evidence, model: LawModel) -> Weighted:
     return Weighted(data, fit, spread)
 
 
-def with_inertia(evidence: Evidence, weighted: Weighted, inertia: tuple[float, float]) -> Weighted:
-    """The settled fit with one datum more: an inertia and its standard error."""
+def with_inertia(
+    evidence: Evidence, weighted: Weighted, inertia: tuple[float, float], *, dof: int
+) -> Weighted:
+    """The settled fit with one datum more: an inertia and its standard error, known to `dof` degrees."""
     torque = _first_data(evidence, weighted.data.model)
     data = replace(
         weighted.data,
         inertia=inertia,
+        inertia_dof=dof,
         torque=torque.torque,
         acceleration=torque.acceleration,
     )
@@ -92,7 +103,6 @@ def _settle_steady(evidence: Evidence, first: FitData, *, inertia: float | None)
     torque = first.torque - (inertia or 0.0) * first.acceleration
     data = replace(first, torque=torque, acceleration=np.zeros_like(torque), momenta=(), whitening=())
     fit = fit_friction(replace(data, model=replace(data.model, free_shape=())))
-    spread = RunSpread(0.0, np.inf)
     for number in range(ROUNDS):
         seen = replace(fit, values={**fit.values, "inertia": inertia or 0.0})
         spread = _spread_of(evidence, data, seen)
@@ -106,7 +116,7 @@ def _known_inertia(evidence: Evidence, data: FitData) -> float | None:
     return evidence.response.inertia if evidence.response is not None else start_inertia(data)
 
 
-def _balanced_inertia(momenta: Sequence[Momentum], fit: FrictionFit, spread: RunSpread) -> float:
+def _balanced_inertia(momenta: Sequence[Momentum], fit: FrictionFit, spread: Spread) -> float:
     """The J that balances the motion under the law of the steady runs, by weighted least squares."""
     inertia = fit.values["inertia"]
     left = right = 0.0
@@ -158,17 +168,27 @@ def _first_data(evidence: Evidence, model: LawModel) -> FitData:
         start_stderr=np.hypot(line, typical),
         momenta=evidence.momenta,
         whitening=tuple(
-            _whitening(motion, 0.0, RunSpread(typical, np.inf), scale=1.0) for motion in evidence.momenta
+            _whitening(motion, 0.0, Spread(np.full(2, typical**2), np.inf), scale=1.0)
+            for motion in evidence.momenta
         ),
         inertia=None,
     )
 
 
-def _spread_of(evidence: Evidence, data: FitData, fit: FrictionFit) -> RunSpread:
-    """The spread between runs that the residuals of a fit show."""
-    residual, own = _run_residuals(data, fit), _own_variance(evidence, data, fit)
+def _spread_of(evidence: Evidence, data: FitData, fit: FrictionFit) -> Spread:
+    """The spreads that the residuals of a fit of steady runs and breakaways show."""
+    runs = data.torque.size
+    number = np.arange(runs + data.start_torque.size, dtype=np.float64)
+    order = in_order(data, runs=number[:runs], starts=number[runs:]).astype(int)
+    stderr = in_order(data, runs=data.run_stderr, starts=data.start_stderr)
+    residual = np.empty(order.size)
+    residual[order] = residuals(data, fit.values) * stderr
+    basis = np.empty((order.size, len(fit.free)))
+    basis[order] = jacobian(data, fit.values, fit.free) * stderr[:, None]
+    known = np.concatenate([_own_variance(evidence, data, fit), _start_variance(evidence, data, fit)])
     travel = np.array([run.travel for run in evidence.used_runs])
-    return run_spread(residual, travel, own, parameters=sum(name != "inertia" for name in fit.free))
+    groups = members(data.run_direction, data.start_direction)
+    return spread_of(residual, basis, known, groups, travel)
 
 
 def _own_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatArray:
@@ -179,34 +199,43 @@ def _own_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatA
     return np.asarray(white_variance(runs) + place**2 + (_slopes(data, fit) * speed) ** 2)
 
 
-def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: RunSpread) -> FitData:
-    """The data with onsets and standard errors as a fit and the spread between runs make them."""
-    runs, starts = evidence.used_runs, evidence.used_starts
-    travel = np.array([run.travel for run in runs])
-    start_torque, delay_error = _onset_torque(starts, fit)
+def _start_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatArray:
+    """What the ramp's line, the wave's error and the detection make of a breakaway's variance (m,)."""
+    starts = evidence.used_starts
     line = np.array([np.hypot(start.line.stderr, start.place_stderr) for start in starts])
-    line = np.hypot(line, delay_error)
-    place = _place_spread(data, fit, start_torque, line, spread)
-    scale = _motion_scale(data.momenta, fit, spread)
+    _, delay_error = _onset_torque(starts, fit)
+    return np.asarray(line**2 + delay_error**2)
+
+
+def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: Spread) -> FitData:
+    """The data with onsets and standard errors as a fit and the spreads make them."""
+    runs = data.torque.size
+    start_torque, _ = _onset_torque(evidence.used_starts, fit)
+    known = np.concatenate([_own_variance(evidence, data, fit), _start_variance(evidence, data, fit)])
+    travel = np.array([run.travel for run in evidence.used_runs])
+    part = np.ones(known.size)
+    part[:runs] = averaged_out(travel, spread.wavelength)
+    by_group = members(data.run_direction, data.start_direction) * part * spread.variances[:, None]
+    total = known + by_group.sum(axis=0)
+    start_stderr = np.sqrt(total[runs:])
+    rate = np.array([abs(start.line.rate) for start in evidence.used_starts])
+    trend = rate_trend(data.start_direction, rate, start_torque, start_stderr)
+    if trend is not None:
+        start_torque = start_torque - trend.excess
+        start_stderr = start_stderr * trend.widening(data.start_direction)
+    scale, dof = _motion_scale(data.momenta, fit, spread)
     return replace(
         data,
-        run_stderr=np.sqrt(_own_variance(evidence, data, fit) + spread.variance(travel)),
+        run_stderr=np.sqrt(total[:runs]),
         start_torque=start_torque,
-        start_stderr=np.sqrt(line**2 + place),
+        start_stderr=start_stderr,
+        trend=trend,
+        shares=by_group / total,
+        motion_dof=dof,
         whitening=tuple(
             _whitening(motion, fit.values["inertia"], spread, scale=scale) for motion in data.momenta
         ),
     )
-
-
-def _run_residuals(data: FitData, fit: FrictionFit) -> FloatArray:
-    """Torque less the law's (n,) [N m]."""
-    residual = np.zeros_like(data.torque)
-    for direction in data.model.directions:
-        own = data.run_direction == SIGN[direction]
-        predicted = friction_torque(fit.law(direction), data.speed[own])
-        residual[own] = data.torque[own] - predicted - fit.values["inertia"] * data.acceleration[own]
-    return residual
 
 
 def _slopes(data: FitData, fit: FrictionFit) -> FloatArray:
@@ -239,36 +268,22 @@ def _onset_torque(starts: Sequence[Breakaway], fit: FrictionFit) -> tuple[FloatA
     return torque, error
 
 
-def _place_spread(
-    data: FitData, fit: FrictionFit, torque: FloatArray, line: FloatArray, spread: RunSpread
-) -> float:
-    """Variance of F_s from place to place [(N m)^2], pooled over directions and with the runs' spread."""
-    excess, degrees = PRIOR_STARTS * spread.spread**2, PRIOR_STARTS
-    for direction in data.model.directions:
-        own = data.start_direction == SIGN[direction]
-        if np.count_nonzero(own) < 2:
-            continue
-        coulomb, stribeck, *_ = fit.law(direction)
-        residual = torque[own] - np.mean(torque[own])
-        excess += max(0.0, float(np.sum(residual**2 - line[own] ** 2)))
-        degrees += np.count_nonzero(own) - 1
-        misfit = float(np.mean(torque[own])) - coulomb - stribeck
-        excess += max(0.0, misfit**2 - float(np.mean(line[own] ** 2)) / np.count_nonzero(own))
-    return float(excess / degrees)
-
-
-def _whitening(motion: Momentum, inertia: float, spread: RunSpread, *, scale: float) -> FloatArray:
+def _whitening(motion: Momentum, inertia: float, spread: Spread, *, scale: float) -> FloatArray:
     """Inverse square root of the covariance of a motion's windows (k, k)."""
-    place = spread.variance(motion.travel) * motion.duration**2
+    direction = np.full(motion.travel.size, motion.direction)
+    place = spread.of_runs(direction, motion.travel) * motion.duration**2
     covariance = inertia**2 * motion.speed_covariance + np.diag(motion.impulse_variance + place)
     covariance = covariance + 1e-12 * float(np.trace(covariance)) * np.eye(motion.gain.size)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(scale * covariance)))
 
 
-def _motion_scale(momenta: Sequence[Momentum], fit: FrictionFit, spread: RunSpread) -> float:
-    """Factor on the momenta's covariance under which each ramp, as one datum, strays by its own error."""
+def _motion_scale(momenta: Sequence[Momentum], fit: FrictionFit, spread: Spread) -> tuple[float, float]:
+    """Factor on the momenta's covariance under which each ramp, as one datum, strays by its own error.
+
+    With it the degrees of freedom that it rests on: infinite where the covariance stands as it is.
+    """
     if not momenta:
-        return 1.0
+        return 1.0, np.inf
     inertia = fit.values["inertia"]
     total, strayed, windows = 0.0, 0.0, 0
     for motion in momenta:
@@ -279,5 +294,5 @@ def _motion_scale(momenta: Sequence[Momentum], fit: FrictionFit, spread: RunSpre
         strayed += float(residual @ gain) ** 2 / float(gain @ gain)
         total += float(residual @ residual)
         windows += residual.size
-    ramps = len(momenta)
-    return max(1.0, strayed / max(ramps - 1, 1), total / max(windows - 1, 1))
+    between, within = max(len(momenta) - 1, 1), max(windows - 1, 1)
+    return max((1.0, np.inf), (strayed / between, between), (total / within, within))

@@ -74,7 +74,7 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     held, trials = 0, 0
     for _ in range(MAPS):
         weighted = settle(synthetic_map(speeds, 2e-3, generator), EACH)
-        found = parameters(weighted.data, weighted.fit, axis="rotary", dof=2 * 19 - 8)
+        found = parameters(weighted.data, weighted.fit, axis="rotary")
         for direction, curve in (
             ("positive", ROBOT.friction.positive),
             ("negative", ROBOT.friction.negative),

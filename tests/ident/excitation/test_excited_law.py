@@ -98,3 +98,16 @@ def test_a_motion_one_way_only_says_so() -> None:
     found = excited_law([recording], law="one", axis="linear")
     assert isinstance(found, str)
     assert found.startswith("E-DIRECTION: the link moves with positive velocity only")
+
+
+def test_a_rest_and_a_torque_of_zero_say_so() -> None:
+    rig = rig_of(PLAIN, PLAIN)
+    recording = followed(rig, swings(rig, duration=4.0), np.random.default_rng(4))
+    still = replace(recording, position=np.zeros_like(recording.position))
+    found = excited_law([still], law="one", axis="rotary")
+    assert isinstance(found, str)
+    assert "rest" in found
+    idle = replace(recording, torque=np.zeros_like(recording.torque))
+    found = excited_law([idle], law="one", axis="rotary")
+    assert isinstance(found, str)
+    assert "torque is zero" in found

@@ -52,7 +52,7 @@ def test_every_point_is_the_least_chi_square_with_its_value_held(
 ) -> None:
     data = simulated(truth, np.random.default_rng(11), model=model, ramps=int(name == "inertia"))
     fit = fit_friction(data)
-    _, found = profiles(data, fit, {name: combination}, dof=DOF)
+    _, found = profiles(data, fit, {name: combination}, height=lambda _: quantile(DOF) ** 2)
     profile = found[name].points
     assert profile.value.size >= 5
     assert np.all(np.diff(profile.value) > 0)
@@ -67,7 +67,9 @@ def test_every_point_is_the_least_chi_square_with_its_value_held(
 def test_a_lines_profile_is_its_t_interval() -> None:
     data = simulated(TRUTH, np.random.default_rng(12), model=LawModel(lines=("positive", "negative")))
     fit = fit_friction(data)
-    _, found = profiles(data, fit, {"b": {"positive_viscous_damping": 1.0}}, dof=DOF)
+    _, found = profiles(
+        data, fit, {"b": {"positive_viscous_damping": 1.0}}, height=lambda _: quantile(DOF) ** 2
+    )
     place = fit.free.index("positive_viscous_damping")
     error = float(np.sqrt(fit.covariance[place, place]))
     expected = symmetric(fit.values["positive_viscous_damping"], error, DOF)
@@ -82,7 +84,10 @@ def test_without_slow_speeds_the_low_end_of_v_s_and_the_high_end_of_f_s_are_open
     if fit.values["positive_stribeck_torque"] == 0:
         pytest.skip("no Stribeck effect in this draw")
     _, found = profiles(
-        data, fit, {name: own[name] for name in ("stribeck_velocity", "static_torque")}, dof=8
+        data,
+        fit,
+        {name: own[name] for name in ("stribeck_velocity", "static_torque")},
+        height=lambda _: quantile(8) ** 2,
     )
     assert found["stribeck_velocity"].interval.low is None
     assert found["static_torque"].interval.high is None
@@ -92,6 +97,8 @@ def test_a_damping_of_which_the_data_know_little_is_cut_at_0() -> None:
     truth = {**TRUTH, "positive_viscous_damping": 1e-3}
     data = simulated(truth, np.random.default_rng(14), error=0.02)
     fit = fit_friction(data)
-    _, found = profiles(data, fit, {"b": {"positive_viscous_damping": 1.0}}, dof=DOF)
+    _, found = profiles(
+        data, fit, {"b": {"positive_viscous_damping": 1.0}}, height=lambda _: quantile(DOF) ** 2
+    )
     assert found["b"].interval.low == 0.0
     assert found["b"].interval.high is not None
