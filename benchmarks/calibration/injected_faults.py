@@ -341,9 +341,9 @@ def drift(generator: Generator) -> Injected:
 
 
 def low_speed(generator: Generator) -> Injected:
-    """No speed under 3 v_s, and no ramps."""
+    """No speed under 7 v_s, and no ramps."""
     rig = random_rig(generator)
-    speeds = rig.velocity * np.geomspace(3.0, 40.0, 9)
+    speeds = rig.velocity * np.geomspace(7.0, 60.0, 9)
     logs = [steady_log(rig, s * float(v), generator) for s in (1.0, -1.0) for v in speeds]
     logs += multisine_logs(rig, generator)
     return Injected(
@@ -400,7 +400,7 @@ def few(generator: Generator) -> Injected:
 
 
 def speed_error(generator: Generator) -> Injected:
-    """Slow runs of 25 to 40 counts where the curve is steep, under a quiet torque."""
+    """Slow runs of 30 to 45 counts where the curve is steep, under a quiet torque."""
     rig = random_rig(generator)
     rig = replace(rig, fine=False, noise=0.002 * rig.coulomb)
     speeds = rig.velocity * np.geomspace(0.15, 30.0, 10)
@@ -408,7 +408,7 @@ def speed_error(generator: Generator) -> Injected:
     for side in (1.0, -1.0):
         for speed in speeds.tolist():
             slow = speed < 2.0 * rig.velocity
-            duration = generator.uniform(25.0, 40.0) * rig.resolution / speed if slow else None
+            duration = generator.uniform(30.0, 45.0) * rig.resolution / speed if slow else None
             if slow and duration is not None and duration < 40.0 * rig.period:
                 duration = 40.0 * rig.period
             logs.append(steady_log(rig, side * speed, generator, duration=duration))

@@ -19,8 +19,8 @@ LONGEST = 64  # turns after which the phases are taken anew
 def wave_sums(
     grid: FloatArray, *, position: FloatArray, torque: FloatArray, smooth: FloatArray, stride: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Projections (w, 2) of block torques (m,) [N m] on cos k q and sin k q, k of `grid` (w,) [1/rad], and the
-    products (w, 2, 2) of these, at positions (m,) [rad] that are means over `stride` [rad].
+    """Projections (w, 2) of block torques (m,) [N m] on cos k q and sin k q, k of `grid` (w,) [1/rad], and
+    the products (w, 2, 2) of these, at positions (m,) [rad] that are means over `stride` [rad].
 
     `smooth` (m, 2) is orthonormal; what it spans is taken off the waves.
     """
