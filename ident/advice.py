@@ -26,7 +26,9 @@ import numpy as np
 from data.recording import FloatArray
 from ident.evidence.gathering import Evidence
 from ident.fit.confidence import quantile
-from ident.fit.friction_fit import DIRECTIONS, SIGN, Direction, FitData, friction_torque, law_of, residuals
+from ident.fit.fit_data import FitData
+from ident.fit.friction_fit import friction_torque, law_of, residuals
+from ident.fit.law_model import SIGN, Direction
 from ident.fit.weighting import Weighted
 from ident.model.friction import steepest_fall_factor
 
@@ -59,7 +61,7 @@ class NextRun:
 
 @dataclass(frozen=True)
 class Advice:
-    """The runs that narrow one quantity of one direction most, in the order of their worth."""
+    """The runs that narrow one quantity [rad/s, N m or 1/s] of one direction most, the best first."""
 
     direction: Direction
     quantity: Quantity
@@ -81,6 +83,8 @@ class Advice:
 
 @dataclass(frozen=True)
 class _Candidate:
+    """A run that may be advised: speed [rad/s], ramp rate [N m/s], duration [s]."""
+
     protocol: Literal["constant_velocity", "breakaway"]
     direction: Direction
     speed: float | None
@@ -95,18 +99,14 @@ def advise(evidence: Evidence, weighted: Weighted) -> tuple[Advice, ...]:
     known = tuple(_information(weighted, values) for values in laws)
     candidates = [
         candidate
-        for direction in _directions(weighted)
+        for direction in weighted.data.model.directions
         for candidate in _candidates(evidence, weighted, laws, direction)
     ]
     return tuple(
         _advice(weighted, laws, known, candidates, direction, quantity)
-        for direction in _directions(weighted)
+        for direction in weighted.data.model.directions
         for quantity in QUANTITIES
     )
-
-
-def _directions(weighted: Weighted) -> list[Direction]:
-    return [d for d in DIRECTIONS if np.any(weighted.data.run_direction == SIGN[d])]
 
 
 def _advice(
@@ -117,7 +117,8 @@ def _advice(
     direction: Direction,
     quantity: Quantity,
 ) -> Advice:
-    flat = direction in weighted.data.lines or weighted.fit.law(direction)[1] <= 0.0
+    model = weighted.data.model
+    flat = model.law_of(direction) in model.lines or weighted.fit.law(direction)[1] <= 0.0
     if flat and quantity != "static_torque":
         why = (
             "no Stribeck effect is seen in this direction: slower speeds and breakaways would show one, if "
@@ -180,8 +181,8 @@ def _plausible(weighted: Weighted) -> list[Mapping[str, float]]:
     laws: list[Mapping[str, float]] = []
     for shift in PLAUSIBLE:
         values = dict(fit.values)
-        for direction in _directions(weighted):
-            name = f"{direction}_stribeck_velocity"
+        for law in weighted.data.model.laws:
+            name = f"{law}_stribeck_velocity"
             if name not in fit.free:
                 continue
             where = fit.free.index(name)

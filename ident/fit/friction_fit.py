@@ -1,94 +1,69 @@
-r"""The one stage: both directions' laws and the common inertia from all data at once, with lmfit.
+r"""The one stage: the laws of all directions and the common inertia from all data at once.
 
-The data are magnitudes along the motion:
+The data are magnitudes along the motion, with s the direction and o the offset (0 but for one law for both):
 
-- steady runs:      u_i - J a_i = F_c + dF exp(-(v_i/v_s)^beta) + b v_i,
-- breakaways:       u_i - u' d  = F_c + dF,           d the time from onset to detection,
+- steady runs:      u_i - J a_i = F_c + dF exp(-(v_i/v_s)^beta) + b v_i + s o,
+- breakaways:       u_i - u' d  = F_c + dF + s o,     d the time from onset to detection,
 - momentum:         each window of the motion after breakaway,
 - the inertia of the frequency response, as one datum with its error.
 
-All are weighted by real standard errors, so chi-square is what it says and lmfit must not rescale the
-covariance (`scale_covar=False`). F_s is fitted as F_c + dF with dF >= 0; F_c >= 0, b >= 0, v_s > 0. For given
-v_s and beta the law is linear: a grid of v_s over all speeds, solved by non-negative least squares in each
-direction, gives the starts, so that no second minimum goes unseen.
+All are weighted by real standard errors, so chi-square is what it says. F_s is fitted as F_c + dF with
+dF >= 0; F_c >= 0, b >= 0, v_s > 0. For given v_s and beta the law is linear: a grid of v_s over all speeds,
+each with the best linear law, gives the starts, so that no second minimum goes unseen.
+
+The fits run compiled (`bounded_least_squares`); lmfit polishes the last one, with derivatives of its own, and
+writes the report.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final, Literal
+from dataclasses import dataclass, replace
 
 import lmfit
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from data.recording import FloatArray
-from ident.evidence.momentum import Momentum
+from ident.fit.fit_data import LARGEST_SHAPE, LEAST_SHAPE, FitData
+from ident.fit.law_model import BLOCK, DIRECTIONS, SIGN, Direction, LawModel, LawName
+from ident.fit.normal_equations import OFFSET, chi_square
+from ident.fit.refits import refit_each
 
-Direction = Literal["positive", "negative"]
-DIRECTIONS: Final[tuple[Direction, Direction]] = ("positive", "negative")
-SIGN: Final[Mapping[Direction, int]] = {"positive": 1, "negative": -1}
-
-GRID = 40  # Stribeck velocities tried as starts in each direction
+GRID = 40  # Stribeck velocities tried as starts in each law
 STARTS = 8  # polished by the full fit
-UNFELT = 1e-3  # of the slowest speed: a Stribeck velocity that no run feels
+SHAPES = (1.0, 0.6, 1.8)  # of beta, where it is free
 FELT = 0.1  # change of the residuals, in standard errors, under a parameter's own size: less is not felt
 SAME = 1.0  # chi-square above the least, below which another minimum is as good
+APART = 0.5  # of ln v_s, beyond which two minima are two
 
 
-@dataclass(frozen=True)
-class FitData:
-    """All that is fitted, as magnitudes along the motion. n steady runs, m breakaways."""
-
-    run_direction: NDArray[np.int64]  # (n,) +1 or -1
-    speed: FloatArray  # (n,) [rad/s]
-    torque: FloatArray  # (n,) [N m]
-    acceleration: FloatArray  # (n,) along the motion [rad/s^2]
-    run_stderr: FloatArray  # (n,) [N m]
-    start_direction: NDArray[np.int64]  # (m,)
-    start_torque: FloatArray  # (m,) less the ramp's rise up to the detection [N m]
-    start_stderr: FloatArray  # (m,) [N m]
-    momenta: tuple[Momentum, ...]
-    whitening: tuple[FloatArray, ...]  # (k, k) for each momentum: the inverse square root of its covariance
-    inertia: tuple[float, float] | None  # from the frequency response, with its standard error
-    lines: tuple[Direction, ...] = ()  # directions without Stribeck effect: dF raises their breakaways alone
-
-    @property
-    def has_inertia(self) -> bool:
-        """Whether anything in the data knows J."""
-        return self.inertia is not None or bool(self.momenta)
+Law = tuple[float, float, float, float, float]  # F_c, dF, v_s, b, beta of a direction, the offset in its F_c
 
 
 @dataclass(frozen=True)
 class FrictionFit:
-    """The best fit. Names are lmfit's: 'inertia', 'positive_stribeck_torque' (dF), ..."""
+    """The best fit. Names are those of `LawModel.names`: 'inertia', 'positive_stribeck_torque' (dF), ..."""
 
+    model: LawModel
     values: Mapping[str, float]
     free: tuple[str, ...]  # names of the free parameters, in the order of the covariance
     covariance: FloatArray  # (p, p); infinite variance where the data do not feel a parameter [SI]
     chi_square: float  # [-]
-    report: str
     other_minimum: Mapping[str, float] | None  # a second one that fits as well
 
-    def law(self, direction: Direction) -> tuple[float, float, float, float, float]:
-        """F_c, dF, v_s, b, beta of a direction."""
+    def law(self, direction: Direction) -> Law:
+        """F_c, dF, v_s, b, beta of a direction as its torque was logged: with the offset in F_c."""
         return law_of(self.values, direction)
 
 
-def law_of(values: Mapping[str, float], direction: Direction) -> tuple[float, float, float, float, float]:
-    """F_c, dF, v_s, b, beta of a direction, from parameters by name."""
-    return (
-        values[f"{direction}_coulomb_torque"],
-        values[f"{direction}_stribeck_torque"],
-        values[f"{direction}_stribeck_velocity"],
-        values[f"{direction}_viscous_damping"],
-        values[f"{direction}_stribeck_shape"],
-    )
+def law_of(values: Mapping[str, float], direction: Direction) -> Law:
+    """F_c (with the offset), dF, v_s, b, beta of a direction, from parameters by name."""
+    law = direction if f"{direction}_coulomb_torque" in values else "mean"
+    coulomb, stribeck, velocity, damping, shape = (values[f"{law}_{name}"] for name in BLOCK)
+    return coulomb + SIGN[direction] * values["torque_offset"], stribeck, velocity, damping, shape
 
 
-def friction_torque(law: tuple[float, float, float, float, float], speed: FloatArray) -> FloatArray:
+def friction_torque(law: Law, speed: FloatArray) -> FloatArray:
     """F(v) + b v [N m] at speeds (n,) >= 0 [rad/s]; law: F_c, dF, v_s, b, beta."""
     coulomb, stribeck, velocity, damping, shape = law
     return np.asarray(coulomb + stribeck * np.exp(-((speed / velocity) ** shape)) + damping * speed)
@@ -98,7 +73,7 @@ def residuals(data: FitData, values: Mapping[str, float]) -> FloatArray:
     """Every datum less its prediction, in standard errors."""
     inertia = values["inertia"]
     parts: list[FloatArray] = []
-    for direction in DIRECTIONS:
+    for direction in data.model.directions:
         law = law_of(values, direction)
         own = data.run_direction == SIGN[direction]
         predicted = friction_torque(law, data.speed[own]) + inertia * data.acceleration[own]
@@ -115,54 +90,84 @@ def residuals(data: FitData, values: Mapping[str, float]) -> FloatArray:
     return np.concatenate(parts)
 
 
-def fit_friction(data: FitData, *, free_beta: bool, start: FrictionFit | None = None) -> FrictionFit:
+def in_order(
+    data: FitData, *, runs: FloatArray, starts: FloatArray, motion: float = 0.0, inertia: float = 0.0
+) -> FloatArray:
+    """What belongs to each run (n,) and each breakaway (m,), in the order of `residuals`."""
+    parts: list[FloatArray] = []
+    for direction in data.model.directions:
+        parts.append(runs[data.run_direction == SIGN[direction]])
+        parts.append(starts[data.start_direction == SIGN[direction]])
+        parts += [np.full(one.gain.size, motion) for one in data.momenta if one.direction == SIGN[direction]]
+    if data.inertia is not None:
+        parts.append(np.array([inertia]))
+    return np.concatenate(parts)
+
+
+def jacobian(data: FitData, values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
+    """Slope of the residuals with the free parameters (N, p) [1/SI], by central differences."""
+    columns = []
+    for name in free:
+        step = 1e-6 * max(abs(values[name]), 1e-9 * max(values.values()))
+        if name.endswith("stribeck_velocity"):
+            step = 1e-6 * values[name]
+        ahead, behind = (residuals(data, {**values, name: values[name] + off}) for off in (step, -step))
+        columns.append((ahead - behind) / (2 * step))
+    return np.column_stack(columns)
+
+
+def fit_friction(data: FitData, *, start: FrictionFit | None = None) -> FrictionFit:
     """Fit everything; from an earlier fit where there is one, else from several starts."""
-    starts: Sequence[Mapping[str, float]]
-    starts = _starts(data) if start is None else [start.values]
-    if free_beta and start is None:
-        first = _polish(data, starts[0], free_beta=False)
-        starts = [{**dict(first.params.valuesdict()), **beta} for beta in _SHAPES] + list(starts[1:])
-    results = [_polish(data, values, free_beta=free_beta) for values in starts]
-    results.sort(key=lambda result: float(result.chisqr))
-    best = results[0]
-    values = {name: float(value) for name, value in best.params.valuesdict().items()}
-    free = tuple(best.var_names)
+    begun = _starts(data) if start is None else vector(data, start.values)[None, :]
+    points, cost = _refitted(data, _straightened(data, begun))
+    if start is None and data.model.free_shape:
+        shaped = np.repeat(points, len(SHAPES), axis=0)
+        for law in data.model.free_shape:
+            place = data.model.place(law) + BLOCK.index("stribeck_shape")
+            shaped[:, place] = np.tile(SHAPES, len(points))
+        points, cost = _refitted(data, shaped)
+    order = np.argsort(cost, kind="stable")
+    points, cost = points[order], cost[order]
+    values = _named(data, points[0])
     return FrictionFit(
+        model=data.model,
         values=values,
-        free=free,
-        covariance=_covariance(data, values, free),
-        chi_square=float(best.chisqr),
-        report=str(lmfit.fit_report(best, show_correl=True, min_correl=0.3)),
-        other_minimum=_other_minimum(results),
+        free=data.free,
+        covariance=_covariance(data, points[0]),
+        chi_square=float(cost[0]),
+        other_minimum=_other_minimum(data, points, cost),
     )
 
 
-_SHAPES: Final = tuple(
-    {"positive_stribeck_shape": beta, "negative_stribeck_shape": beta} for beta in (1.0, 0.6, 1.8)
-)
+def polished(data: FitData, fit: FrictionFit) -> tuple[FrictionFit, str]:
+    """The fit polished by lmfit, and lmfit's report.
 
-
-def _polish(data: FitData, start: Mapping[str, float], *, free_beta: bool) -> lmfit.minimizer.MinimizerResult:
-    """One least-squares fit from one start."""
+    Parameters that ended at a bound, or that the data do not feel, stay where they are: lmfit moves away from
+    a bound, and gives up all standard errors for one that it cannot tell.
+    """
     parameters = lmfit.Parameters()
-    straight = {f"{d}_stribeck_{name}" for d in data.lines for name in ("velocity", "shape")}
-    for name, begun in start.items():
+    places = {name: place for place, name in enumerate(data.model.names)}
+    x = vector(data, fit.values)
+    lost = dict(zip(fit.free, np.isinf(np.diag(fit.covariance)), strict=True))
+    for name, value in fit.values.items():
+        place = places[name]
+        at_bound = not data.box.low[place] < x[place] < data.box.high[place]
         shape = name.endswith("stribeck_shape")
-        known = (shape and not free_beta) or (name == "inertia" and not data.has_inertia)
-        known = known or name in straight
-        value = begun
-        if name in straight:
-            value = 1.0 if shape else UNFELT * float(np.min(data.speed))
         parameters.add(
-            name, value=value, min=0.05 if shape else 0.0, max=8.0 if shape else np.inf, vary=not known
+            name,
+            value=value,
+            min=-np.inf if name == "torque_offset" else LEAST_SHAPE if shape else 0.0,
+            max=LARGEST_SHAPE if shape else np.inf,
+            vary=name in lost and not lost[name] and not at_bound,
         )
 
     def objective(current: lmfit.Parameters) -> FloatArray:
         return residuals(data, current.valuesdict())
 
-    # lmfit's own covariance, of which only the report makes use, has no roots where a parameter is not felt.
+    # Real standard errors: the covariance must not be rescaled. lmfit takes roots of it for the report, which
+    # are none where two parameters cannot be told apart.
     with np.errstate(invalid="ignore", over="ignore"):
-        return lmfit.minimize(
+        result = lmfit.minimize(
             objective,
             parameters,
             method="least_squares",
@@ -172,85 +177,124 @@ def _polish(data: FitData, start: Mapping[str, float], *, free_beta: bool) -> lm
             xtol=1e-12,
             gtol=1e-12,
         )
+        report = str(lmfit.fit_report(result, show_correl=True, min_correl=0.3))
+    values = {name: float(value) for name, value in result.params.valuesdict().items()}
+    covariance = _covariance(data, vector(data, values))
+    return replace(fit, values=values, covariance=covariance, chi_square=float(result.chisqr)), report
 
 
-def _covariance(data: FitData, values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
+def vector(data: FitData, values: Mapping[str, float]) -> FloatArray:
+    """Parameters by name as the compiled fits have them (p,), straight where the model has lines."""
+    x = np.array([values[name] for name in data.model.names])
+    for law in data.model.laws:
+        velocity = data.model.place(law) + BLOCK.index("stribeck_velocity")
+        x[velocity] = np.log(x[velocity])
+    return np.asarray(_straightened(data, x[None, :])[0])
+
+
+def _straightened(data: FitData, points: FloatArray) -> FloatArray:
+    """Points (s, p), the v_s of every line where no run feels it."""
+    straight = points.copy()
+    for law in data.model.lines:
+        velocity = data.model.place(law) + BLOCK.index("stribeck_velocity")
+        straight[:, velocity] = data.box.low[velocity]
+        straight[:, data.model.place(law) + BLOCK.index("stribeck_shape")] = 1.0
+    return straight
+
+
+def _named(data: FitData, x: FloatArray) -> dict[str, float]:
+    return {
+        name: float(np.exp(value) if name.endswith("stribeck_velocity") else value)
+        for name, value in zip(data.model.names, x, strict=True)
+    }
+
+
+def _refitted(data: FitData, begun: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """The minimum near each start (s, p), and its chi-square (s,)."""
+    points, cost = np.array(begun), np.zeros(len(begun))
+    refit_each(data.problem, points, data.box, data.work, cost)
+    return points, cost
+
+
+def _covariance(data: FitData, x: FloatArray) -> FloatArray:
     """Inverse of the information of the free parameters (p, p).
 
-    lmfit gives up the errors of all where one parameter is not felt by the data (a Stribeck velocity without
-    a Stribeck effect); here that one alone has none.
+    Where one parameter is not felt by the data (a Stribeck velocity without a Stribeck effect), it alone has
+    no finite error.
     """
-    columns = []
-    for name in free:
-        step = 1e-6 * max(abs(values[name]), 1e-9 * max(values.values()))
-        if name.endswith("stribeck_velocity"):
-            step = 1e-6 * values[name]
-        ahead, behind = (residuals(data, {**values, name: values[name] + off}) for off in (step, -step))
-        columns.append((ahead - behind) / (2 * step))
-    jacobian = np.column_stack(columns)
+    chi_square(data.problem, x, data.work.h, data.work.g, 0)
+    lower = np.tril(data.work.h[0])
+    free = data.box.free
+    values = _named(data, x)
+    slope = np.array(
+        [values[name] if name.endswith("stribeck_velocity") else 1.0 for name in data.model.names]
+    )
+    information = ((lower + np.tril(lower, -1).T) / np.outer(slope, slope))[np.ix_(free, free)]
     # A Stribeck torque that ended at 0 is felt as F_s is, in parts of F_c.
     size = np.array(
         [
             max(abs(values[name]), values.get(name.replace("stribeck", "coulomb"), 0.0))
             if name.endswith("stribeck_torque")
             else abs(values[name])
-            for name in free
+            for name in data.free
         ]
     )
-    norm = np.linalg.norm(jacobian, axis=0)
+    norm = np.sqrt(np.diag(information))
     felt = (norm * size > FELT) | ((size == 0) & (norm > 0))
+    felt |= np.array([name == "torque_offset" for name in data.free])
     covariance = np.diag(np.where(felt, 0.0, np.inf))
-    scaled = jacobian[:, felt] / norm[felt]
-    inverse = np.linalg.pinv(scaled.T @ scaled, rcond=1e-14, hermitian=True)
-    covariance[np.ix_(felt, felt)] = inverse / np.outer(norm[felt], norm[felt])
+    scale = np.outer(norm[felt], norm[felt])
+    inverse = np.linalg.pinv(information[np.ix_(felt, felt)] / scale, rcond=1e-14, hermitian=True)
+    covariance[np.ix_(felt, felt)] = inverse / scale
     return covariance
 
 
-def _starts(data: FitData) -> list[dict[str, float]]:
+def _starts(data: FitData) -> FloatArray:
     """Starts from the linear problem on a grid of v_s: the local minima first, then the rest spread out."""
-    ranked = {direction: _ranked(data, direction) for direction in DIRECTIONS}
-    inertia = start_inertia(data) or 0.0
+    blank = _blank(data)
+    ranked = [_ranked(data, law, blank) for law in data.model.laws]
     starts = []
     for number in range(STARTS):
-        values = {"inertia": inertia}
-        for direction in DIRECTIONS:
-            choice = ranked[direction][number % len(ranked[direction])]
-            values |= {f"{direction}_{name}": value for name, value in choice.items()}
-        starts.append(values)
-    return starts
+        x = blank.copy()
+        for law, choices in zip(data.model.laws, ranked, strict=True):
+            place = data.model.place(law)
+            x[place : place + len(BLOCK)] = choices[number % len(choices)]
+        starts.append(x)
+    return np.array(starts)
 
 
-def _ranked(data: FitData, direction: Direction) -> list[dict[str, float]]:
-    """The law of one direction by non-negative least squares for each v_s of the grid, best minima first."""
-    own = data.run_direction == SIGN[direction]
-    begun = data.start_direction == SIGN[direction]
-    speed = np.concatenate([data.speed[own], np.zeros(int(begun.sum()))])
-    torque = np.concatenate([data.torque[own], data.start_torque[begun]])
-    weight = 1.0 / np.concatenate([data.run_stderr[own], data.start_stderr[begun]])
-    moving = speed[speed > 0]
-    grid = np.geomspace(0.3 * moving.min(), 2.0 * moving.max(), GRID)
-    found = []
-    for velocity in grid:
-        basis = np.column_stack([np.ones_like(speed), np.exp(-speed / velocity), speed])
-        scale = np.linalg.norm(basis * weight[:, None], axis=0)
-        coefficient, norm = nnls(basis * (weight[:, None] / scale), torque * weight)
-        found.append((norm, coefficient / scale, velocity))
-    norms = np.array([norm for norm, _, _ in found])
-    padded = np.concatenate([[np.inf], norms, [np.inf]])
-    minima = (norms <= padded[:-2]) & (norms <= padded[2:])
-    order = sorted(range(GRID), key=lambda k: (not minima[k], norms[k]))
+def _blank(data: FitData) -> FloatArray:
+    """A start that knows the inertia alone (p,)."""
+    x = np.zeros(len(data.model.names))
+    x[0] = start_inertia(data) or 0.0
+    for law in data.model.laws:
+        place = data.model.place(law)
+        x[place : place + len(BLOCK)] = (0.0, 0.0, np.log(float(np.min(data.speed))), 0.0, 1.0)
+    return x
+
+
+def _ranked(data: FitData, law: LawName, blank: FloatArray) -> list[FloatArray]:
+    """Blocks of one law: the best linear law of runs and breakaways for each v_s, best minima first."""
+    place = data.model.place(law)
+    velocity = place + BLOCK.index("stribeck_velocity")
+    own = np.isin(data.run_direction, [SIGN[d] for d in DIRECTIONS if data.model.law_of(d) == law])
+    moving = data.speed[own]
+    steady = replace(data, momenta=(), whitening=())
+    largest = float(np.max(np.abs(data.torque[own])))
+    points = np.tile(blank, (GRID, 1))
+    points[:, place] = points[:, place + 1] = 0.5 * largest
+    points[:, velocity] = np.linspace(np.log(0.3 * moving.min()), np.log(2.0 * moving.max()), GRID)
+    free = np.zeros(points.shape[1], dtype=np.bool_)
+    free[[place, place + 1, place + BLOCK.index("viscous_damping")]] = True
+    free[OFFSET] = data.model.has_offset
+    cost = np.zeros(GRID)
+    refit_each(steady.problem, points, data.box._replace(free=free), data.work, cost)
+    padded = np.concatenate([[np.inf], cost, [np.inf]])
+    minima = (cost <= padded[:-2]) & (cost <= padded[2:])
+    order = sorted(range(GRID), key=lambda k: (not minima[k], cost[k]))
     spread = [k for k in order if minima[k]] + list(range(GRID // 16, GRID, GRID // 8))
-    least = 1e-3 * float(np.max(np.abs(torque)))
-    return [
-        {
-            "coulomb_torque": max(float(found[k][1][0]), least),
-            "stribeck_torque": max(float(found[k][1][1]), least),
-            "stribeck_velocity": float(found[k][2]),
-            "viscous_damping": max(float(found[k][1][2]), least / float(moving.max())),
-            "stribeck_shape": 1.0,
-        }
-        for k in spread
-    ]
+    least = np.array([1e-3 * largest, 1e-3 * largest, -np.inf, 1e-3 * largest / float(moving.max()), 1.0])
+    return [np.maximum(points[k, place : place + len(BLOCK)], least) for k in spread]
 
 
 def start_inertia(data: FitData) -> float | None:
@@ -272,16 +316,13 @@ def start_inertia(data: FitData) -> float | None:
     return float(np.median(sound)) if sound else None
 
 
-def _other_minimum(results: Sequence[lmfit.minimizer.MinimizerResult]) -> Mapping[str, float] | None:
-    """A result that fits as well as the best with another v_s."""
-    best = results[0]
-    for other in results[1:]:
-        if float(other.chisqr) > float(best.chisqr) + SAME:
-            continue
-        for direction in DIRECTIONS:
-            name = f"{direction}_stribeck_velocity"
-            ratio = float(other.params[name].value) / float(best.params[name].value)
-            flat = float(best.params[f"{direction}_stribeck_torque"].value) == 0.0
-            if abs(np.log(ratio)) > 0.5 and not flat:
-                return {key: float(value) for key, value in other.params.valuesdict().items()}
+def _other_minimum(data: FitData, points: FloatArray, cost: FloatArray) -> Mapping[str, float] | None:
+    """A minimum that fits as well as the best with another v_s; points (s, p) and cost (s,) best first."""
+    for other in points[1:][cost[1:] <= cost[0] + SAME]:
+        for law in data.model.laws:
+            place = data.model.place(law)
+            velocity = place + BLOCK.index("stribeck_velocity")
+            flat = points[0, place + BLOCK.index("stribeck_torque")] == 0.0
+            if abs(other[velocity] - points[0, velocity]) > APART and not flat:
+                return _named(data, other)
     return None

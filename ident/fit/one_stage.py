@@ -1,15 +1,16 @@
 """The one stage: evidence in, the parameters of the law out, with what has to be said of them.
 
-1. The joint fit is settled without the frequency response; it gives v_s, against which the bias speed of the
+1. The model: a law for each direction that has steady runs, or one for both; beta fixed, free or chosen.
+2. The joint fit is settled without the frequency response; it gives v_s, against which the bias speed of the
    frequency response is judged, and an inertia of its own.
-2. The frequency response's inertia, as the better source, joins the fit as one datum.
-3. Values get intervals, or are withheld with a reason.
+3. The frequency response's inertia, as the better source, joins the fit as one datum.
+4. Values get intervals, or are withheld with a reason.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,10 +20,17 @@ from ident.estimate import Estimate
 from ident.evidence.frequency_response import LEAST_SPEED_RATIO, FrequencyInertia
 from ident.evidence.gathering import Evidence
 from ident.fit.assumptions import Assumptions
+from ident.fit.censoring import with_bounds
 from ident.fit.confidence import quantile
-from ident.fit.friction_fit import DIRECTIONS
-from ident.fit.law_shape import shape_findings
+from ident.fit.friction_fit import polished
+from ident.fit.law_model import DIRECTIONS, Direction, LawModel, LawName
+from ident.fit.law_shape import chosen_shape, shape_findings
+from ident.fit.missing_direction import Missing, missing_directions, of_directions
+from ident.fit.one_law import one_law_findings
 from ident.fit.parameters import UNITS, Parameters, parameters
+from ident.fit.ramp_rates import trend_finding
+from ident.fit.second_minimum import minimum_findings, without_disputed
+from ident.fit.small_samples import certainty
 from ident.fit.stribeck_effect import where_it_shows
 from ident.fit.weighting import Weighted, settle, with_inertia
 from ident.fit.withholding import require_enough
@@ -34,27 +42,32 @@ COMPATIBLE = 3.0  # standard errors between two sources of one value
 class Explained:
     """The law behind the evidence."""
 
+    evidence: Evidence  # with what a missing direction left unused
     weighted: Weighted  # the settled fit and its data
     values: Parameters
     inertia_sources: Mapping[str, Estimate]  # by protocol
+    report: str  # lmfit's own, and what was compared
     findings: tuple[Finding, ...]
 
 
 def explain(evidence: Evidence, *, axis: Axis, assumptions: Assumptions) -> Explained:
-    """Fit the law of each direction and the inertia to the evidence.
+    """Fit the law of each direction, or one for both, and the inertia to the evidence.
 
-    Raises `IdentificationError` (E-FEW) where a direction has too few data.
+    A direction without steady runs is withheld. Raises `IdentificationError` where there is neither
+    (E-DIRECTION), and where a law has too few data (E-FEW).
     """
-    free_beta = assumptions.shape == "free"
-    weighted = where_it_shows(evidence, settle(evidence, free_beta=free_beta), free_beta=free_beta)
-    for direction in DIRECTIONS:
-        require_enough(weighted.data, direction, parameters=5 if free_beta else 4)
+    missing = missing_directions(evidence)
+    evidence = of_directions(evidence, missing)
+    model = _model(assumptions, missing)
+    require_enough(evidence, model)
+    choice = chosen_shape(evidence, model) if assumptions.shape == "chosen" else None
+    model = model if choice is None else choice.model
+    weighted = where_it_shows(evidence, settle(evidence, model))
     unit = UNITS[axis]["inertia"]
-    dof = _degrees(weighted)
     sources: dict[str, Estimate] = {}
-    findings: list[Finding] = []
+    findings: list[Finding] = list(missing.findings)
     if evidence.momenta:
-        sources["breakaway"] = parameters(weighted.data, weighted.fit, axis=axis, dof=dof).inertia
+        sources["breakaway"] = _inertia_of(weighted, unit)
     if evidence.response is not None:
         response, refusal = _response_source(evidence.response, weighted, unit=unit)
         sources["frequency_response"] = response
@@ -62,20 +75,41 @@ def explain(evidence: Evidence, *, axis: Axis, assumptions: Assumptions) -> Expl
             findings.append(refusal)
         else:
             datum = (evidence.response.inertia, evidence.response.stderr)
-            weighted = with_inertia(evidence, weighted, datum, free_beta=free_beta)
-            dof = _degrees(weighted)
+            weighted = with_inertia(evidence, weighted, datum, dof=evidence.response.dof)
         findings += _disagreement(sources, unit)
-    values = parameters(weighted.data, weighted.fit, axis=axis, dof=dof)
-    findings += [] if free_beta else shape_findings(weighted)
-    findings += [*values.findings, *_fit_findings(weighted), *_offset_finding(values, axis)]
-    return Explained(weighted, values, sources, tuple(findings))
+    fit, report = polished(weighted.data, weighted.fit)
+    values = parameters(weighted.data, fit, axis=axis, missing=missing.reasons)
+    weighted = replace(weighted, fit=values.fit)
+    values = with_bounds(without_disputed(values), evidence)
+    findings += shape_findings(weighted) if assumptions.shape == "fixed" else []
+    findings += [] if choice is None else [choice.finding]
+    findings += one_law_findings(evidence, model)
+    if weighted.data.trend is not None:
+        findings.append(trend_finding(weighted.data.trend, unit=UNITS[axis]["static_torque"]))
+    findings += [*values.findings, *minimum_findings(values), *_offset_finding(values, axis)]
+    report = report if choice is None else f"{report}\n\n{choice.table}"
+    return Explained(evidence, weighted, values, sources, report, tuple(findings))
 
 
-def _degrees(weighted: Weighted) -> int:
-    """Data beyond the free parameters: runs, breakaways, and one datum a ramp's motion."""
-    data = weighted.data
-    friction = sum(name != "inertia" for name in weighted.fit.free)
-    return max(data.torque.size + data.start_torque.size - friction, 1)
+def _model(assumptions: Assumptions, missing: Missing) -> LawModel:
+    """One law has an offset only where both directions were recorded: else they cannot be told apart."""
+    laws: tuple[LawName, ...] = tuple(way for way in DIRECTIONS if way not in missing.reasons)
+    if assumptions.laws == "one" and not missing.reasons:
+        laws = ("mean",)
+    return LawModel(laws, free_shape=laws if assumptions.shape == "free" else ())
+
+
+def _inertia_of(weighted: Weighted, unit: str) -> Estimate:
+    """The inertia of a fit with the interval of its standard error."""
+    value = weighted.fit.values["inertia"]
+    found = certainty(weighted.data, weighted.fit)
+    own = np.array([float(name == "inertia") for name in weighted.fit.free])
+    place = weighted.fit.free.index("inertia")
+    error = float(np.sqrt(found.covariance[place, place]))
+    if not (value > 0 and np.isfinite(error)):
+        return Estimate(None, unit, withheld="E-BOUND: the inertia ended at its bound 0; record a multisine.")
+    reach = quantile(found.dof(own)) * error
+    return Estimate(value, unit, error, (max(value - reach, 0.0), value + reach))
 
 
 def _response_source(
@@ -83,10 +117,8 @@ def _response_source(
 ) -> tuple[Estimate, Finding | None]:
     """The inertia of the frequency response; withheld where its lowest speed lies in the Stribeck range."""
     for fit in response.fits:
-        direction = "positive" if fit.bias_speed > 0 else "negative"
-        velocity = weighted.fit.values[f"{direction}_stribeck_velocity"]
-        effect = weighted.fit.values[f"{direction}_stribeck_torque"] > 0
-        if not effect or fit.lowest_speed >= LEAST_SPEED_RATIO * velocity:
+        velocity = _stribeck_range(weighted, "positive" if fit.bias_speed > 0 else "negative")
+        if fit.lowest_speed >= LEAST_SPEED_RATIO * velocity:
             continue
         text = (
             f"{fit.log}: the speed falls to {fit.lowest_speed:.3g}, under {LEAST_SPEED_RATIO:g} v_s = "
@@ -100,6 +132,20 @@ def _response_source(
     reach = quantile(response.dof) * response.stderr
     interval = (response.inertia - reach, response.inertia + reach)
     return Estimate(response.inertia, unit, response.stderr, interval), None
+
+
+def _stribeck_range(weighted: Weighted, direction: Direction) -> float:
+    """The v_s under which the friction of a direction is no damping; 0 where it has no Stribeck effect.
+
+    Where that direction has no law, the largest that is known.
+    """
+    fit = weighted.fit
+    own = fit.model.law_of(direction)
+    laws = fit.model.laws if own is None else (own,)
+    return max(
+        fit.values[f"{law}_stribeck_velocity"] if fit.values[f"{law}_stribeck_torque"] > 0 else 0.0
+        for law in laws
+    )
 
 
 def _disagreement(sources: dict[str, Estimate], unit: str) -> list[Finding]:
@@ -119,22 +165,6 @@ def _disagreement(sources: dict[str, Estimate], unit: str) -> list[Finding]:
         "The frequency response is the one reported."
     )
     return [Finding("E-LACKOFFIT", Severity.WARN, text)]
-
-
-def _fit_findings(weighted: Weighted) -> list[Finding]:
-    other = weighted.fit.other_minimum
-    if other is None:
-        return []
-    pairs = ", ".join(
-        f"{direction} v_s = {weighted.fit.values[f'{direction}_stribeck_velocity']:.3g} or "
-        f"{other[f'{direction}_stribeck_velocity']:.3g}"
-        for direction in DIRECTIONS
-    )
-    return [
-        Finding(
-            "E-LOCAL", Severity.WARN, f"two minima fit equally well: {pairs}. More speeds around v_s tell."
-        )
-    ]
 
 
 def _offset_finding(values: Parameters, axis: Axis) -> list[Finding]:

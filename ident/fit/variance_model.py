@@ -1,15 +1,21 @@
-r"""What a run's mean torque is worth: a variance model pooled over all runs.
+r"""What a datum's torque is worth: a variance model pooled over all runs and breakaways of a direction.
 
 Errors estimated from a run's own few blocks ruin the coverage of intervals, and the scatter of its samples
 counts the sensor's noise alone. Two things move a run's mean that the run itself hardly shows: ripple, of
-which a slow run sees one phase only, and whatever differs from run to run. So
+which a slow run sees one phase only, and whatever differs from run to run; breakaways differ from place to
+place. So
 
-    Var_i = w_i^2 + tau^2 / (1 + (travel_i / lambda)^2),
+    Var_i = w_i^2 + tau^2 / (1 + (travel_i / lambda)^2)    of a steady run,
+    Var_i = w_i^2 + sigma^2                                of a breakaway,
 
-w_i^2 the white part times one ratio pooled over all runs, tau the run-to-run spread, lambda the travel over
-which ripple averages out (infinite: it never does). tau and lambda are those under which the residuals of
-the fit are most likely, and the residuals are inflated for the parameters that they were fitted with. A
-finite lambda has to earn its place: it is the best of several tried, and it makes long runs look better.
+w_i^2 what is known of the datum's own error, tau the run-to-run spread, lambda the travel over which ripple
+averages out (infinite: it never does), sigma the spread of places. tau and sigma are of each direction:
+joints that rub differently also stray differently, and a common spread would promise too much for the worse.
+They are the most likely under what the fit leaves over (`ident.fit.restricted_likelihood`). A finite lambda
+has to earn its place: it is the best of several tried, and it makes long runs look better.
+
+A single breakaway says nothing of its spread: the other direction's is taken, or if that has none either,
+the steady runs'.
 """
 
 from __future__ import annotations
@@ -18,27 +24,52 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from data.recording import FloatArray
 from ident.evidence.friction_map import SteadyRun
+from ident.fit.restricted_likelihood import most_likely_variances
 
 TRAVELS = 8  # candidates for lambda
-SPREADS = 60  # candidates for tau
 EARNED = 6.0  # by which twice the log likelihood must rise for a finite lambda
 FINEST = 1e-4  # least standard error, in parts of the torque: no torque sensor knows more
+REPLICATES = 2  # breakaways that show a spread
+SIGNS = (1, -1)
+
+Directions = NDArray[np.int64]  # +1 or -1
 
 
 @dataclass(frozen=True)
-class RunSpread:
-    """tau [N m] and lambda [rad]."""
+class Spread:
+    """Variances by group (g,) [(N m)^2]: runs +, runs -, then the groups of breakaways; lambda [rad]."""
 
-    spread: float
+    variances: FloatArray
     wavelength: float
 
-    def variance(self, travel: FloatArray) -> FloatArray:
-        """Run-to-run variance (n,) [(N m)^2] of runs that travel (n,) [rad]."""
-        ratio = travel / self.wavelength if np.isfinite(self.wavelength) else np.zeros_like(travel)
-        return np.asarray(self.spread**2 / (1.0 + ratio**2))
+    def of_runs(self, direction: Directions, travel: FloatArray) -> FloatArray:
+        """Run-to-run variance (n,) [(N m)^2] of runs or windows that travel (n,) [rad]."""
+        tau_squared = np.where(direction > 0, self.variances[0], self.variances[1])
+        return np.asarray(tau_squared * averaged_out(travel, self.wavelength))
+
+
+def averaged_out(travel: FloatArray, wavelength: float) -> FloatArray:
+    """Part of the run-to-run variance that a travel (n,) [rad] leaves."""
+    ratio = travel / wavelength if np.isfinite(wavelength) else np.zeros_like(travel)
+    return np.asarray(1.0 / (1.0 + ratio**2))
+
+
+def members(run_direction: Directions, start_direction: Directions) -> NDArray[np.bool_]:
+    """Which runs and breakaways share a variance (g, n + m)."""
+    of_run = np.arange(run_direction.size + start_direction.size) < run_direction.size
+    direction = np.concatenate([run_direction, start_direction])
+    shown = [sign for sign in SIGNS if np.count_nonzero(start_direction == sign) >= REPLICATES]
+    alone = of_run if shown else np.ones_like(of_run)
+    groups = [alone & (direction == sign) for sign in SIGNS]
+    if len(shown) == 1:
+        groups.append(~of_run)
+    elif shown:
+        groups += [~of_run & (direction == sign) for sign in shown]
+    return np.array(groups)
 
 
 def white_variance(runs: Sequence[SteadyRun]) -> FloatArray:
@@ -49,22 +80,25 @@ def white_variance(runs: Sequence[SteadyRun]) -> FloatArray:
     return np.asarray(ratio * own + least)
 
 
-def run_spread(residual: FloatArray, travel: FloatArray, variance: FloatArray, parameters: int) -> RunSpread:
-    """tau and lambda by maximum likelihood from the residuals (n,) [N m] of a fit with so many parameters."""
-    n = residual.size
-    if n <= parameters:
-        return RunSpread(0.0, np.inf)
-    inflated = residual**2 * n / (n - parameters)
-    largest = float(np.sqrt(np.max(inflated, initial=0.0)))
-    spreads = np.concatenate([[0.0], np.geomspace(1e-3, 2.0, SPREADS) * largest])
-    wavelengths = np.append(np.geomspace(travel.min(), travel.max(), TRAVELS), np.inf)
-    best, least = RunSpread(0.0, np.inf), np.inf
-    for wavelength in wavelengths:
-        for spread in spreads:
-            candidate = RunSpread(float(spread), float(wavelength))
-            total = variance + candidate.variance(travel)
-            cost = float(np.sum(inflated / total + np.log(total)))
-            cost += EARNED if np.isfinite(wavelength) and spread else 0.0
-            if cost < least:
-                best, least = candidate, cost
+def spread_of(
+    residual: FloatArray, basis: FloatArray, known: FloatArray, groups: NDArray[np.bool_], travel: FloatArray
+) -> Spread:
+    """The most likely spread.
+
+    Parameters
+    ----------
+    residual : (n + m,) of runs and then breakaways [N m]
+    basis : (n + m, p) change of the law's torque with its parameters
+    known : (n + m,) variance that is known [(N m)^2]
+    groups : (g, n + m) from `members`
+    travel : (n,) of the runs [rad]
+    """
+    best, least = Spread(np.zeros(len(groups)), np.inf), np.inf
+    for wavelength in (np.inf, *np.geomspace(travel.min(), travel.max(), TRAVELS)):
+        part = np.ones(residual.size)
+        part[: travel.size] = averaged_out(travel, wavelength)
+        variances, cost = most_likely_variances(residual, basis, known, groups * part)
+        cost += EARNED if np.isfinite(wavelength) else 0.0
+        if cost < least:
+            best, least = Spread(variances, float(wavelength)), cost
     return best

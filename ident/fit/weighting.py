@@ -16,17 +16,19 @@ from data.recording import FloatArray
 from ident.evidence.breakaway import Breakaway
 from ident.evidence.gathering import Evidence
 from ident.evidence.momentum import Momentum
+from ident.fit.fit_data import FitData
 from ident.fit.friction_fit import (
-    DIRECTIONS,
-    SIGN,
-    Direction,
-    FitData,
     FrictionFit,
     fit_friction,
     friction_torque,
+    in_order,
+    jacobian,
+    residuals,
     start_inertia,
 )
-from ident.fit.variance_model import RunSpread, run_spread, white_variance
+from ident.fit.law_model import SIGN, Direction, LawModel
+from ident.fit.ramp_rates import rate_trend
+from ident.fit.variance_model import Spread, averaged_out, members, spread_of, white_variance
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
 from ident.response import breakaway_delay
@@ -35,7 +37,6 @@ ROUNDS = 5  # of the steady runs alone
 MOST_ROUNDS = 12  # with the motion
 SETTLED = 0.02  # standard errors by which a round may still move the fit
 FIRST_SPREAD = 0.01  # of the torque, before anything is known
-PRIOR_STARTS = 4.0  # breakaways that the runs' spread is worth
 
 
 @dataclass(frozen=True)
@@ -44,19 +45,19 @@ class Weighted:
 
     data: FitData
     fit: FrictionFit
-    spread: RunSpread
+    spread: Spread
 
 
-def settle(evidence: Evidence, *, free_beta: bool) -> Weighted:
-    """Fit, weigh anew, and fit again until the weights have settled; from many starts first and last.
+def settle(evidence: Evidence, model: LawModel) -> Weighted:
+    """Fit a model, weigh anew, and fit again until the weights have settled; from many starts first and last.
 
     The steady runs and breakaways settle alone first, and theirs is the spread between runs. The motion joins
     afterwards, with a misfit of its own as seen from their law: however wrong it is, it can neither bend the
     steady runs nor make them look worse than they are.
     """
-    first = _first_data(evidence)
+    first = _first_data(evidence, model)
     inertia = _known_inertia(evidence, first)
-    alone = _settle_steady(evidence, first, inertia=inertia, free_beta=free_beta)
+    alone = _settle_steady(evidence, first, inertia=inertia)
     if not evidence.momenta or inertia is None:
         return alone
     spread = alone.spread
@@ -65,48 +66,48 @@ def settle(evidence: Evidence, *, free_beta: bool) -> Weighted:
     data = first
     for number in range(MOST_ROUNDS):
         data = reweighted(evidence, data, fit, spread)
-        again = fit_friction(data, free_beta=free_beta, start=fit)
+        again = fit_friction(data, start=fit)
         change = _change(fit, again)
         fit = again
         if number >= 1 and change < SETTLED:
             break
-    fit = fit_friction(data, free_beta=free_beta, start=None)
+    fit = fit_friction(data)
     return Weighted(data, fit, spread)
 
 
 def with_inertia(
-    evidence: Evidence, weighted: Weighted, inertia: tuple[float, float], *, free_beta: bool
+    evidence: Evidence, weighted: Weighted, inertia: tuple[float, float], *, dof: int
 ) -> Weighted:
-    """The settled fit with one datum more: an inertia and its standard error."""
-    torque = _first_data(evidence)
+    """The settled fit with one datum more: an inertia and its standard error, known to `dof` degrees."""
+    torque = _first_data(evidence, weighted.data.model)
     data = replace(
         weighted.data,
         inertia=inertia,
+        inertia_dof=dof,
         torque=torque.torque,
         acceleration=torque.acceleration,
     )
     fit = replace(weighted.fit, values={**weighted.fit.values, "inertia": inertia[0]})
-    fit = fit_friction(data, free_beta=free_beta, start=fit)
+    fit = fit_friction(data, start=fit)
     for _ in range(2):
         data = reweighted(evidence, data, fit, weighted.spread)
-        fit = fit_friction(data, free_beta=free_beta, start=fit)
+        fit = fit_friction(data, start=fit)
     return Weighted(data, replace(fit, other_minimum=weighted.fit.other_minimum), weighted.spread)
 
 
-def _settle_steady(evidence: Evidence, first: FitData, *, inertia: float | None, free_beta: bool) -> Weighted:
+def _settle_steady(evidence: Evidence, first: FitData, *, inertia: float | None) -> Weighted:
     """The fit of steady runs and breakaways; what their speed still changes is taken off with `inertia`.
 
     Where no inertia is known, that small term stays in.
     """
     torque = first.torque - (inertia or 0.0) * first.acceleration
     data = replace(first, torque=torque, acceleration=np.zeros_like(torque), momenta=(), whitening=())
-    fit = fit_friction(data, free_beta=False)
-    spread = RunSpread(0.0, np.inf)
+    fit = fit_friction(replace(data, model=replace(data.model, free_shape=())))
     for number in range(ROUNDS):
         seen = replace(fit, values={**fit.values, "inertia": inertia or 0.0})
         spread = _spread_of(evidence, data, seen)
         data = reweighted(evidence, data, seen, spread)
-        fit = fit_friction(data, free_beta=free_beta, start=None if number == ROUNDS - 1 else fit)
+        fit = fit_friction(data, start=None if number == ROUNDS - 1 else fit)
     return Weighted(data, fit, spread)
 
 
@@ -115,7 +116,7 @@ def _known_inertia(evidence: Evidence, data: FitData) -> float | None:
     return evidence.response.inertia if evidence.response is not None else start_inertia(data)
 
 
-def _balanced_inertia(momenta: Sequence[Momentum], fit: FrictionFit, spread: RunSpread) -> float:
+def _balanced_inertia(momenta: Sequence[Momentum], fit: FrictionFit, spread: Spread) -> float:
     """The J that balances the motion under the law of the steady runs, by weighted least squares."""
     inertia = fit.values["inertia"]
     left = right = 0.0
@@ -134,20 +135,20 @@ def _change(fit: FrictionFit, again: FrictionFit) -> float:
     return float(np.max(np.abs(change) / np.sqrt(np.diag(again.covariance))))
 
 
-def fitted_robot(fit: FrictionFit, lines: Sequence[Direction] = ()) -> OneLinkRobot | None:
-    """The robot of a fit, where its values are a robot's; without Stribeck effect where its law is a line."""
-    curves = {}
+def _robot_one_way(fit: FrictionFit, direction: Direction) -> OneLinkRobot | None:
+    """A robot with the law of a direction both ways, where its values are a robot's; without Stribeck effect
+    where its law is a line.
+    """
+    coulomb, stribeck, velocity, damping, shape = fit.law(direction)
+    stribeck = 0.0 if fit.model.law_of(direction) in fit.model.lines else stribeck
     try:
-        for direction in DIRECTIONS:
-            coulomb, stribeck, velocity, damping, shape = fit.law(direction)
-            stribeck = 0.0 if direction in lines else stribeck
-            curves[direction] = StribeckCurve(coulomb + stribeck, coulomb, velocity, damping, shape)
-        return OneLinkRobot(fit.values["inertia"], StribeckFriction(**curves))
+        curve = StribeckCurve(coulomb + stribeck, coulomb, velocity, damping, shape)
+        return OneLinkRobot(fit.values["inertia"], StribeckFriction(curve, curve))
     except ModelError:
         return None
 
 
-def _first_data(evidence: Evidence) -> FitData:
+def _first_data(evidence: Evidence, model: LawModel) -> FitData:
     runs, starts = evidence.used_runs, evidence.used_starts
     run_direction = np.array([run.direction for run in runs], dtype=np.int64)
     start_direction = np.array([start.direction for start in starts], dtype=np.int64)
@@ -156,6 +157,7 @@ def _first_data(evidence: Evidence) -> FitData:
     typical = FIRST_SPREAD * float(np.median(np.abs(torque)))
     line = np.array([start.line.stderr for start in starts])
     return FitData(
+        model=model,
         run_direction=run_direction,
         speed=np.array([abs(run.velocity) for run in runs]),
         torque=torque,
@@ -166,17 +168,27 @@ def _first_data(evidence: Evidence) -> FitData:
         start_stderr=np.hypot(line, typical),
         momenta=evidence.momenta,
         whitening=tuple(
-            _whitening(motion, 0.0, RunSpread(typical, np.inf), scale=1.0) for motion in evidence.momenta
+            _whitening(motion, 0.0, Spread(np.full(2, typical**2), np.inf), scale=1.0)
+            for motion in evidence.momenta
         ),
         inertia=None,
     )
 
 
-def _spread_of(evidence: Evidence, data: FitData, fit: FrictionFit) -> RunSpread:
-    """The spread between runs that the residuals of a fit show."""
-    residual, own = _run_residuals(data, fit), _own_variance(evidence, data, fit)
+def _spread_of(evidence: Evidence, data: FitData, fit: FrictionFit) -> Spread:
+    """The spreads that the residuals of a fit of steady runs and breakaways show."""
+    runs = data.torque.size
+    number = np.arange(runs + data.start_torque.size, dtype=np.float64)
+    order = in_order(data, runs=number[:runs], starts=number[runs:]).astype(int)
+    stderr = in_order(data, runs=data.run_stderr, starts=data.start_stderr)
+    residual = np.empty(order.size)
+    residual[order] = residuals(data, fit.values) * stderr
+    basis = np.empty((order.size, len(fit.free)))
+    basis[order] = jacobian(data, fit.values, fit.free) * stderr[:, None]
+    known = np.concatenate([_own_variance(evidence, data, fit), _start_variance(evidence, data, fit)])
     travel = np.array([run.travel for run in evidence.used_runs])
-    return run_spread(residual, travel, own, parameters=sum(name != "inertia" for name in fit.free))
+    groups = members(data.run_direction, data.start_direction)
+    return spread_of(residual, basis, known, groups, travel)
 
 
 def _own_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatArray:
@@ -184,43 +196,52 @@ def _own_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatA
     runs = evidence.used_runs
     speed = np.array([run.velocity_stderr for run in runs])
     place = np.array([run.place_stderr for run in runs])
-    return np.asarray(white_variance(runs) + place**2 + (_slopes(data, fit) * speed) ** 2)
+    return np.asarray(white_variance(runs) + place**2 + (law_slopes(data, fit) * speed) ** 2)
 
 
-def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: RunSpread) -> FitData:
-    """The data with onsets and standard errors as a fit and the spread between runs make them."""
-    runs, starts = evidence.used_runs, evidence.used_starts
-    travel = np.array([run.travel for run in runs])
-    start_torque, delay_error = _onset_torque(starts, fit, data.lines)
+def _start_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatArray:
+    """What the ramp's line, the wave's error and the detection make of a breakaway's variance (m,)."""
+    starts = evidence.used_starts
     line = np.array([np.hypot(start.line.stderr, start.place_stderr) for start in starts])
-    line = np.hypot(line, delay_error)
-    place = _place_spread(data, fit, start_torque, line, spread)
-    scale = _motion_scale(data.momenta, fit, spread)
+    _, delay_error = _onset_torque(starts, fit)
+    return np.asarray(line**2 + delay_error**2)
+
+
+def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: Spread) -> FitData:
+    """The data with onsets and standard errors as a fit and the spreads make them."""
+    runs = data.torque.size
+    start_torque, _ = _onset_torque(evidence.used_starts, fit)
+    known = np.concatenate([_own_variance(evidence, data, fit), _start_variance(evidence, data, fit)])
+    travel = np.array([run.travel for run in evidence.used_runs])
+    part = np.ones(known.size)
+    part[:runs] = averaged_out(travel, spread.wavelength)
+    by_group = members(data.run_direction, data.start_direction) * part * spread.variances[:, None]
+    total = known + by_group.sum(axis=0)
+    start_stderr = np.sqrt(total[runs:])
+    rate = np.array([abs(start.line.rate) for start in evidence.used_starts])
+    trend = rate_trend(data.start_direction, rate, start_torque, start_stderr)
+    if trend is not None:
+        start_torque = start_torque - trend.excess
+        start_stderr = start_stderr * trend.widening(data.start_direction)
+    scale, dof = _motion_scale(data.momenta, fit, spread)
     return replace(
         data,
-        run_stderr=np.sqrt(_own_variance(evidence, data, fit) + spread.variance(travel)),
+        run_stderr=np.sqrt(total[:runs]),
         start_torque=start_torque,
-        start_stderr=np.sqrt(line**2 + place),
+        start_stderr=start_stderr,
+        trend=trend,
+        shares=by_group / total,
+        motion_dof=dof,
         whitening=tuple(
             _whitening(motion, fit.values["inertia"], spread, scale=scale) for motion in data.momenta
         ),
     )
 
 
-def _run_residuals(data: FitData, fit: FrictionFit) -> FloatArray:
-    """Torque less the law's (n,) [N m]."""
-    residual = np.zeros_like(data.torque)
-    for direction in DIRECTIONS:
-        own = data.run_direction == SIGN[direction]
-        predicted = friction_torque(fit.law(direction), data.speed[own])
-        residual[own] = data.torque[own] - predicted - fit.values["inertia"] * data.acceleration[own]
-    return residual
-
-
-def _slopes(data: FitData, fit: FrictionFit) -> FloatArray:
+def law_slopes(data: FitData, fit: FrictionFit) -> FloatArray:
     """The law's slope at each run (n,) [N m s/rad]."""
     slope = np.zeros_like(data.torque)
-    for direction in DIRECTIONS:
+    for direction in data.model.directions:
         own = data.run_direction == SIGN[direction]
         law, speed = fit.law(direction), data.speed[own]
         step = 1e-4 * speed
@@ -228,17 +249,16 @@ def _slopes(data: FitData, fit: FrictionFit) -> FloatArray:
     return slope
 
 
-def _onset_torque(
-    starts: Sequence[Breakaway], fit: FrictionFit, lines: Sequence[Direction]
-) -> tuple[FloatArray, FloatArray]:
+def _onset_torque(starts: Sequence[Breakaway], fit: FrictionFit) -> tuple[FloatArray, FloatArray]:
     """Torque at the onset (m,) [N m], magnitudes, and the error that the delay may bring (m,)."""
-    robot = fitted_robot(fit, lines)
+    robots = {direction: _robot_one_way(fit, direction) for direction in fit.model.directions}
     torque, error = np.zeros(len(starts)), np.zeros(len(starts))
     for number, start in enumerate(starts):
         rate, torque[number] = abs(start.line.rate), abs(start.torque)
+        direction: Direction = "positive" if start.direction > 0 else "negative"
+        robot = robots[direction]
         if robot is None:
             continue
-        direction: Direction = "positive" if start.direction > 0 else "negative"
         delays = [
             breakaway_delay(robot, direction=direction, ramp_rate=rate, travel=start.travel + off)
             for off in (-start.travel_stderr, 0.0, start.travel_stderr)
@@ -248,36 +268,22 @@ def _onset_torque(
     return torque, error
 
 
-def _place_spread(
-    data: FitData, fit: FrictionFit, torque: FloatArray, line: FloatArray, spread: RunSpread
-) -> float:
-    """Variance of F_s from place to place [(N m)^2], pooled over directions and with the runs' spread."""
-    excess, degrees = PRIOR_STARTS * spread.spread**2, PRIOR_STARTS
-    for direction in DIRECTIONS:
-        own = data.start_direction == SIGN[direction]
-        if np.count_nonzero(own) < 2:
-            continue
-        coulomb, stribeck, *_ = fit.law(direction)
-        residual = torque[own] - np.mean(torque[own])
-        excess += max(0.0, float(np.sum(residual**2 - line[own] ** 2)))
-        degrees += np.count_nonzero(own) - 1
-        misfit = float(np.mean(torque[own])) - coulomb - stribeck
-        excess += max(0.0, misfit**2 - float(np.mean(line[own] ** 2)) / np.count_nonzero(own))
-    return float(excess / degrees)
-
-
-def _whitening(motion: Momentum, inertia: float, spread: RunSpread, *, scale: float) -> FloatArray:
+def _whitening(motion: Momentum, inertia: float, spread: Spread, *, scale: float) -> FloatArray:
     """Inverse square root of the covariance of a motion's windows (k, k)."""
-    place = spread.variance(motion.travel) * motion.duration**2
+    direction = np.full(motion.travel.size, motion.direction)
+    place = spread.of_runs(direction, motion.travel) * motion.duration**2
     covariance = inertia**2 * motion.speed_covariance + np.diag(motion.impulse_variance + place)
     covariance = covariance + 1e-12 * float(np.trace(covariance)) * np.eye(motion.gain.size)
     return np.asarray(np.linalg.inv(np.linalg.cholesky(scale * covariance)))
 
 
-def _motion_scale(momenta: Sequence[Momentum], fit: FrictionFit, spread: RunSpread) -> float:
-    """Factor on the momenta's covariance under which each ramp, as one datum, strays by its own error."""
+def _motion_scale(momenta: Sequence[Momentum], fit: FrictionFit, spread: Spread) -> tuple[float, float]:
+    """Factor on the momenta's covariance under which each ramp, as one datum, strays by its own error.
+
+    With it the degrees of freedom that it rests on: infinite where the covariance stands as it is.
+    """
     if not momenta:
-        return 1.0
+        return 1.0, np.inf
     inertia = fit.values["inertia"]
     total, strayed, windows = 0.0, 0.0, 0
     for motion in momenta:
@@ -288,5 +294,5 @@ def _motion_scale(momenta: Sequence[Momentum], fit: FrictionFit, spread: RunSpre
         strayed += float(residual @ gain) ** 2 / float(gain @ gain)
         total += float(residual @ residual)
         windows += residual.size
-    ramps = len(momenta)
-    return max(1.0, strayed / max(ramps - 1, 1), total / max(windows - 1, 1))
+    between, within = max(len(momenta) - 1, 1), max(windows - 1, 1)
+    return max((1.0, np.inf), (strayed / between, between), (total / within, within))

@@ -10,12 +10,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from data.findings import Finding, Severity
 from data.recording import FloatArray
-from ident.evidence.gathering import IdentificationError
+from ident.evidence.gathering import Evidence, IdentificationError
 from ident.fit.confidence import Interval
-from ident.fit.friction_fit import SIGN, Direction, FitData, FrictionFit
+from ident.fit.fit_data import LARGEST_SHAPE, LEAST_SHAPE, FitData
+from ident.fit.friction_fit import FrictionFit
+from ident.fit.law_model import BLOCK, SIGN, LawModel, LawName
 
 LEAST_SPEEDS = 3  # under v_s, and over 3 v_s
 LOOSE = 0.5  # relative half-width of an interval beyond which sparse speeds are believed no longer
@@ -34,35 +37,51 @@ class Withheld:
     findings: tuple[Finding, ...]
 
 
-def require_enough(data: FitData, direction: Direction, *, parameters: int) -> None:
-    """Raise `IdentificationError` (E-FEW) where a direction has under three data more than parameters."""
-    runs = int(np.count_nonzero(data.run_direction == SIGN[direction]))
-    starts = int(np.count_nonzero(data.start_direction == SIGN[direction]))
-    if runs + starts - parameters >= SPARE:
-        return
-    raise IdentificationError(
-        f"E-FEW: {direction} direction: {runs} constant-velocity run(s) and {starts} breakaway(s) for "
-        f"{parameters} "
-        f"parameters; {parameters + SPARE} are the least, or the law fits anything and its errors mean "
-        "nothing. "
-        f"Record {parameters + SPARE - runs - starts} more speeds with {direction} velocity."
-    )
+def require_enough(evidence: Evidence, model: LawModel) -> None:
+    """Raise `IdentificationError` (E-FEW) where a law has under three data more than parameters."""
+    for law in model.laws:
+        runs, starts, parameters = counted(evidence, model, law)
+        if runs + starts - parameters >= SPARE:
+            continue
+        more = parameters + SPARE - runs - starts
+        way = "in both directions" if law == "mean" else f"with {law} velocity"
+        raise IdentificationError(
+            f"E-FEW: {where(law)}: {runs} constant-velocity run(s) and {starts} breakaway(s) for "
+            f"{parameters} parameters; {parameters + SPARE} are the least, or the law fits anything and its "
+            f"errors mean nothing. Record {more} more speeds {way}."
+        )
+
+
+def counted(evidence: Evidence, model: LawModel, law: LawName) -> tuple[int, int, int]:
+    """How many steady runs, breakaways and parameters a law has, taken for a curve."""
+    signs = [SIGN[d] for d in model.directions if model.law_of(d) == law]
+    runs = sum(run.direction in signs for run in evidence.used_runs)
+    starts = sum(start.direction in signs for start in evidence.used_starts)
+    return runs, starts, len(BLOCK) - int(law not in model.free_shape) + int(model.has_offset)
+
+
+def where(law: LawName) -> str:
+    """How a finding calls the directions that a law holds in."""
+    return "both directions" if law == "mean" else f"{law} direction"
 
 
 def withheld(
     data: FitData,
     fit: FrictionFit,
-    direction: Direction,
+    law: LawName,
     *,
     stderr: Mapping[str, float],
     interval: Mapping[str, Interval],
 ) -> Withheld:
-    """What is withheld of one direction. stderr and interval by parameter name; 'stribeck_torque' is dF."""
-    coulomb, stribeck, velocity, damping, _ = fit.law(direction)
+    """What is withheld of one law. stderr and interval by parameter name; 'stribeck_torque' is dF."""
+    coulomb, stribeck, velocity, damping, shape = (fit.values[f"{law}_{name}"] for name in BLOCK)
     reasons: dict[str, str] = {}
     codes: dict[str, str] = {}
-    speeds = _distinct(data.speed[data.run_direction == SIGN[direction]])
-    low, high = int(np.sum(speeds < velocity)), int(np.sum(speeds > 3 * velocity))
+    speeds = _distinct(data.speed[_of(data, law, data.run_direction)])
+    # Noise that makes v_s look long must not put runs under it: only those under its whole interval count.
+    surely = interval["stribeck_velocity"].low or 0.0 if "stribeck_velocity" in interval else 0.0
+    low, high = int(np.sum(speeds < surely)), int(np.sum(speeds > 3 * velocity))
+    moved = any(_of(data, law, np.array([motion.direction for motion in data.momenta], dtype=np.int64)))
 
     def withhold(code: str, names: tuple[str, ...], text: str) -> None:
         for name in names:
@@ -70,32 +89,32 @@ def withheld(
         codes.setdefault(code, text)
 
     least = interval["stribeck_torque"].low
-    line = direction in data.lines
+    line = law in data.model.lines
     if line or least is None or least <= 0.0 or stribeck <= 0.0:
         withhold(
             "E-NOSTRIBECK",
             ("stribeck_velocity", "stribeck_shape"),
-            f"{direction} direction: F_s - F_c = {stribeck:.3g} with an interval that holds 0: no Stribeck "
+            f"{where(law)}: F_s - F_c = {stribeck:.3g} with an interval that holds 0: no Stribeck "
             f"effect is seen, so its velocity has no meaning{_LINE if line else ''}. "
             f"Record speeds below {0.2 * float(speeds.min()):.2g} and breakaways if one is expected.",
         )
     sparse = not line and (low < LEAST_SPEEDS or high < LEAST_SPEEDS)
-    if sparse and _loose(velocity, interval["stribeck_velocity"]):
-        where = f"under {velocity:.3g}" if low < LEAST_SPEEDS else f"over {3 * velocity:.3g}"
+    unseen = low < LEAST_SPEEDS and not moved  # the bend itself: its shape would be taken on trust
+    if sparse and (unseen or _loose(velocity, interval["stribeck_velocity"])):
+        missing = f"under {surely or velocity:.3g}" if low < LEAST_SPEEDS else f"over {3 * velocity:.3g}"
         text = (
-            f"{direction} direction: {low} speed(s) under v_s and {high} over 3 v_s; the curve's bend is "
-            "not in the "
-            f"data. Run at least {LEAST_SPEEDS} speeds {where}."
+            f"{where(law)}: {low} speed(s) surely under v_s and {high} over 3 v_s; the curve's bend is "
+            f"not in the data. Run at least {LEAST_SPEEDS} speeds {missing}."
         )
         withhold("E-LOWSPEED", ("stribeck_velocity", "stribeck_shape"), text)
-        if low < LEAST_SPEEDS and not np.any(data.start_direction == SIGN[direction]):
+        if low < LEAST_SPEEDS and not np.any(_of(data, law, data.start_direction)):
             withhold("E-LOWSPEED", ("static_torque",), text)
-    begun = np.any(data.start_direction == SIGN[direction])
-    if not begun and not line and _loose(coulomb + stribeck, interval["static_torque"]):
+    begun = np.any(_of(data, law, data.start_direction))
+    if not begun and (line or _loose(coulomb + stribeck, interval["static_torque"])):
         withhold(
             "E-LOWSPEED",
             ("static_torque",),
-            f"{direction} direction: without breakaways F_s is the law at rest, and the slowest speed, "
+            f"{where(law)}: without breakaways F_s is the law at rest, and the slowest speed, "
             f"{float(speeds.min()):.3g}, is too far from it. Ramp the torque from rest, or run slower.",
         )
     for name, value in (("coulomb_torque", coulomb), ("viscous_damping", damping)):
@@ -103,19 +122,34 @@ def withheld(
             withhold(
                 "E-BOUND",
                 (name,),
-                f"{direction} direction: {name} ended at its bound 0: the data would have it negative. "
-                "Record more "
-                "and faster speeds, and look for drift.",
+                f"{where(law)}: {name} ended at its bound 0: the data would have it negative"
+                f"{_at_most(interval[name])}. Record more and faster speeds, and look for drift.",
             )
+    if law in data.model.free_shape and not line and not LEAST_SHAPE < shape < LARGEST_SHAPE:
+        withhold(
+            "E-BOUND",
+            ("stribeck_shape", "stribeck_velocity"),
+            f"{where(law)}: beta ended at {shape:g}, the end of what is searched: the data do not hold the "
+            "shape of the curve, and v_s goes with it. Fix beta, or record more speeds around v_s.",
+        )
     for name in (*stderr, "static_torque"):
         if not np.isfinite(stderr.get(name, 0.0)):
             withhold(
                 "E-BOUND",
                 (name,),
-                f"{direction} direction: {name} has no finite error: it is not in the data.",
+                f"{where(law)}: {name} has no finite error: it is not in the data.",
             )
     findings = tuple(Finding(code, Severity.WITHHOLD, text) for code, text in codes.items())
     return Withheld(reasons, findings)
+
+
+def _of(data: FitData, law: LawName, sign: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Which of the data in directions `sign` (n,) a law holds for."""
+    return np.isin(sign, [SIGN[d] for d in data.model.directions if data.model.law_of(d) == law])
+
+
+def _at_most(interval: Interval) -> str:
+    return "" if interval.high is None else f" (it is under {interval.high:.3g}, at 95 %)"
 
 
 def _loose(value: float, interval: Interval) -> bool:

@@ -7,7 +7,14 @@ whether it was used and why not, `notes` the findings. Beside these, for the que
 - `axis` ("rotary" or "linear") and `simulated` (the logs came from a virtual rig);
 - `covariance`: `{"names": ["inertia", "positive.static_torque", ...], "matrix": [[...]]}`, the joint
   covariance of the free parameters in the units of their product, from which prediction intervals are drawn;
+  where one law for both directions was fitted its names are "mean.static_torque", ..., "torque_offset";
+- `profiles`: by name as in `covariance`, and for those of `mean`, `{"value": [...], "rise": [...]}`: points
+  of the profile likelihood, from low values to high, and the rise of chi-square over its least, all other
+  parameters refitted. A 95 % interval ends where it has risen by the square of Student's quantile;
 - `inertia_sources`: the inertia by each protocol that gave one;
+- `breakaways`: how F_s was measured, one entry a direction: `{"direction", "used", "censored", "torque",
+  "spread", "ramp_rates", "places"}`, pairs of the least and the greatest;
+- `validation`: how well runs that the fit had not seen are predicted (`pipelines.results.validation_entry`);
 - `campaign`: `{"name", "rig", "loop"}`, where `loop` holds the gains, the sampling and the compensator of the
   campaign's set-point runs, so far as one value holds for all of them, else null.
 
@@ -19,7 +26,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NoReturn
@@ -28,10 +35,19 @@ import numpy as np
 from pydantic import ValidationError
 
 from data.findings import Finding
-from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate, IdentifiedRobot, RunUse
+from ident.estimate import (
+    CURVE_PARAMETERS,
+    Covariance,
+    Estimate,
+    IdentifiedRobot,
+    ProfilePoints,
+    RunUse,
+)
+from ident.fit.breakaway_summary import BreakawaySummary
 from ident.model import published
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
+from ident.validation.summary import Validation
 from pipelines.exit_status import RefusalError
 from pipelines.results.folder import Owner, ResultFolder
 from pipelines.results.robot_schema import (
@@ -41,6 +57,7 @@ from pipelines.results.robot_schema import (
     EstimateEntry,
     RobotDocument,
 )
+from pipelines.results.validation_entry import validation_entry
 from pipelines.settings.loop import Compensator, LawChoice, LoopDefaults
 
 ROBOT_SCHEMA: Final = "stribeck/robot/1"
@@ -96,8 +113,7 @@ class RobotFile:
 def withheld_parameters(robot: IdentifiedRobot) -> list[str]:
     """A sentence for each parameter that the robot needs and that is withheld."""
     entries = {"inertia": robot.inertia}
-    entries |= {f"positive.{name}": robot.positive[name] for name in CURVE_PARAMETERS}
-    entries |= {f"negative.{name}": robot.negative[name] for name in CURVE_PARAMETERS}
+    entries |= {f"{key}.{name}": law[name] for key, law in robot.laws().items() for name in CURVE_PARAMETERS}
     return [f"{name} is withheld: {entry.withheld}" for name, entry in entries.items() if entry.value is None]
 
 
@@ -136,7 +152,14 @@ def read_robot(source: str | Path) -> RobotFile:
     )
 
 
-def write_robot(folder: ResultFolder, robot: IdentifiedRobot, loop: LoopDefaults) -> Path:
+def write_robot(
+    folder: ResultFolder,
+    robot: IdentifiedRobot,
+    loop: LoopDefaults,
+    *,
+    breakaways: Sequence[BreakawaySummary] = (),
+    validation: Validation | None = None,
+) -> Path:
     """Write robot.json into the folder of the robot's campaign."""
     estimates: dict[str, object] = {"inertia": robot.inertia}
     for direction, entries in (
@@ -152,7 +175,10 @@ def write_robot(folder: ResultFolder, robot: IdentifiedRobot, loop: LoopDefaults
         "torque_offset": robot.torque_offset,
         "inertia_sources": robot.inertia_sources,
         "covariance": {"names": robot.covariance.names, "matrix": robot.covariance.matrix},
+        "profiles": robot.profiles,
         "campaign": {"name": folder.owner.campaign, "rig": folder.owner.rig, "loop": loop},
+        "breakaways": list(breakaways),
+        "validation": None if validation is None else validation_entry(validation),
         "runs": robot.runs,
         "notes": robot.notes,
     }
@@ -205,6 +231,10 @@ def _identified(document: RobotDocument, path: Path) -> IdentifiedRobot:
         notes=tuple(Finding(**note.model_dump()) for note in document.notes),
         covariance=Covariance(names, matrix),
         inertia_sources={name: _estimate(entry) for name, entry in document.inertia_sources.items()},
+        profiles={
+            name: ProfilePoints(np.array(entry.value), np.array(entry.rise))
+            for name, entry in document.profiles.items()
+        },
         axis=document.axis,
         simulated=document.simulated,
     )

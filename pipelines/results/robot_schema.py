@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Annotated, Final, Literal, Self
 
 import numpy as np
@@ -16,7 +17,8 @@ from pipelines.settings.loop import ObserverUpdate
 SAME_MEAN: Final = 1e-6  # relative
 FREE_PARAMETERS: Final = {
     "inertia",
-    *(f"{direction}.{name}" for direction in ("positive", "negative") for name in CURVE_PARAMETERS),
+    "torque_offset",
+    *(f"{law}.{name}" for law in ("positive", "negative", "mean") for name in CURVE_PARAMETERS),
 }
 Number = Annotated[float, Field(allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(allow_inf_nan=False, ge=0)]
@@ -109,6 +111,21 @@ class CovarianceEntry(_Entry):
         return self
 
 
+class ProfileEntry(_Entry):
+    """Points of a profile likelihood."""
+
+    value: tuple[Number, ...]
+    rise: tuple[Number, ...]
+
+    @model_validator(mode="after")
+    def _a_profile(self) -> Self:
+        if len(self.value) != len(self.rise):
+            raise ValueError(f"{len(self.value)} values and {len(self.rise)} rises: a point has one of each")
+        if any(one >= other for one, other in itertools.pairwise(self.value)):
+            raise ValueError("value: a profile goes from low values to high, each once")
+        return self
+
+
 class CurveValues(_Entry):
     """The five numbers of one direction of a compensator."""
 
@@ -169,9 +186,17 @@ class RobotDocument(_Entry):
     torque_offset: EstimateEntry = EstimateEntry(value=None, unit="N m", withheld="not in the file")
     inertia_sources: dict[str, EstimateEntry] = Field(default_factory=dict)
     covariance: CovarianceEntry | None = None
+    profiles: dict[str, ProfileEntry] = Field(default_factory=dict)
     campaign: CampaignEntry | None = None
     runs: tuple[RunEntry, ...] = ()
     notes: tuple[NoteEntry, ...] = ()
+
+    @model_validator(mode="after")
+    def _known_profiles(self) -> Self:
+        unknown = sorted(self.profiles.keys() - FREE_PARAMETERS)
+        if unknown:
+            raise ValueError(f"profiles: {unknown[0]!r} is no parameter")
+        return self
 
     @model_validator(mode="after")
     def _mean_of_both(self) -> Self:

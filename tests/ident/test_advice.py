@@ -10,6 +10,7 @@ import pytest
 from ident.advice import Advice, advise
 from ident.evidence.gathering import Evidence
 from ident.fit.friction_fit import FrictionFit, fit_friction
+from ident.fit.law_model import EACH
 from ident.fit.weighting import Weighted, settle
 from tests.ident.test_coverage import ROBOT, synthetic_map
 
@@ -20,7 +21,7 @@ SPREAD = 2e-3
 @pytest.fixture(scope="module")
 def settled() -> tuple[Evidence, Weighted]:
     evidence = synthetic_map(FAST_ONLY, SPREAD, np.random.default_rng(2))
-    return evidence, settle(evidence, free_beta=False)
+    return evidence, settle(evidence, EACH)
 
 
 def of(advice: tuple[Advice, ...], quantity: str, direction: str = "positive") -> Advice:
@@ -68,7 +69,7 @@ def test_the_promised_error_is_the_one_that_comes(settled: tuple[Evidence, Weigh
             acceleration=np.append(data.acceleration, 0.0 * more),
             run_stderr=np.append(data.run_stderr, 0.0 * more + error),
         )
-    after = fit_friction(data, free_beta=False, start=weighted.fit)
+    after = fit_friction(data, start=weighted.fit)
     promised = float(advice.half_width_then or 0.0) / float(advice.half_width_now or np.inf)
     assert _error(after) / _error(weighted.fit) == pytest.approx(promised, rel=0.25)
 

@@ -12,6 +12,7 @@ from ident.evidence.breakaway import Breakaway, RampLine
 from ident.evidence.friction_map import SteadyRun
 from ident.evidence.gathering import Evidence
 from ident.evidence.hunting import Swing
+from ident.fit.law_model import EACH
 from ident.fit.parameters import parameters
 from ident.fit.weighting import settle
 from ident.model.published import asymmetric_robot
@@ -72,8 +73,8 @@ def test_intervals_cover_the_truth_as_often_as_they_say() -> None:
     speeds = np.asarray(np.geomspace(0.005, 2.5, 14), dtype=np.float64)
     held, trials = 0, 0
     for _ in range(MAPS):
-        weighted = settle(synthetic_map(speeds, 2e-3, generator), free_beta=False)
-        found = parameters(weighted.data, weighted.fit, axis="rotary", dof=2 * 19 - 8)
+        weighted = settle(synthetic_map(speeds, 2e-3, generator), EACH)
+        found = parameters(weighted.data, weighted.fit, axis="rotary")
         for direction, curve in (
             ("positive", ROBOT.friction.positive),
             ("negative", ROBOT.friction.negative),

@@ -15,7 +15,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from data.findings import Finding, Severity
-from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate, IdentifiedRobot, RunUse
+from ident.estimate import (
+    CURVE_PARAMETERS,
+    Covariance,
+    Estimate,
+    IdentifiedRobot,
+    ProfilePoints,
+    RunUse,
+)
 from ident.model import published
 from ident.model.friction import StribeckCurve
 from ident.model.robot import OneLinkRobot
@@ -51,6 +58,7 @@ def identified(robot: OneLinkRobot) -> IdentifiedRobot:
         notes=(Finding("E-OFFSET", Severity.WARN, "text", "a.csv"),),
         covariance=Covariance(("inertia", "positive.static_torque"), np.array([[1e-8, 1e-9], [1e-9, 1e-6]])),
         inertia_sources={"breakaway": Estimate(0.02, "kg m^2")},
+        profiles={"mean.static_torque": ProfilePoints(np.array([0.5, 0.6, 0.8]), np.array([4.5, 0.0, 5.0]))},
         axis="linear",
         simulated=True,
     )
@@ -68,10 +76,13 @@ def test_a_robot_comes_back_bit_for_bit(tmp_path: Path, robot: OneLinkRobot) -> 
     after = found.identified
     assert after is not None
     assert (found.fitted, found.loop, found.owner) == (robot, LOOP, Owner("bench", "rig 3"))
-    same = replace(after, covariance=before.covariance)
+    same = replace(after, covariance=before.covariance, profiles=before.profiles)
     assert same == before
     assert after.covariance.names == before.covariance.names
     np.testing.assert_array_equal(after.covariance.matrix, before.covariance.matrix)
+    for name, profile in before.profiles.items():
+        np.testing.assert_array_equal(after.profiles[name].value, profile.value)
+        np.testing.assert_array_equal(after.profiles[name].rise, profile.rise)
     assert after.draws(3, np.random.default_rng(1)) == before.draws(3, np.random.default_rng(1))
 
 
@@ -155,6 +166,15 @@ HOSTILE: dict[str, tuple[Callable[[Document], object], str]] = {
     "ragged": (lambda d: d["covariance"].update(matrix=[[1.0], [1.0, 2.0]]), "covariance: .* 2 names"),
     "skew": (lambda d: d["covariance"].update(matrix=[[1.0, 0.0], [1.0, 2.0]]), "covariance is symmetric"),
     "indefinite": (lambda d: d["covariance"].update(matrix=[[1.0, 2.0], [2.0, 1.0]]), "negative eigenvalue"),
+    "profile name": (lambda d: d["profiles"].update(x={"value": [], "rise": []}), "'x' is no parameter"),
+    "profile": (
+        lambda d: d["profiles"].update(inertia={"value": [1.0, 2.0], "rise": [0.0]}),
+        r"profiles\.inertia: 2 values and 1 rises",
+    ),
+    "profile order": (
+        lambda d: d["profiles"].update(inertia={"value": [2.0, 1.0], "rise": [0.0, 1.0]}),
+        "profiles.inertia: value: a profile goes from low",
+    ),
     "gain": (lambda d: d["campaign"]["loop"].update(observer=-1.0), "campaign.loop.observer"),
     "a list": (lambda d: d.update(positive=[1, 2]), "positive: "),
 }
