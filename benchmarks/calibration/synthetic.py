@@ -273,7 +273,8 @@ def _motion(
         curve, static_torque=curve.static_torque + error, coulomb_torque=curve.coulomb_torque + error
     )
     samples = math.ceil(2.0 * math.sqrt(2.0 * FAR * robot.inertia / curve.stribeck_torque) / PERIOD)
-    torque = there.static_torque + abs(start.line.rate) * PERIOD * np.arange(samples)
+    time = PERIOD * np.arange(samples, dtype=np.float64)
+    torque = np.asarray(there.static_torque + abs(start.line.rate) * time)
     moving = OneLinkRobot(robot.inertia, StribeckFriction.symmetric(there))
     position, speed = respond(moving, start=(0.0, 0.0), torque=torque, period=PERIOD)
     first, past = (int(np.searchsorted(position, far)) for far in (NEAR, FAR))
