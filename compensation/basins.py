@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from compensation.closed_loop import ClosedLoop, simulate
 from compensation.equilibria import equilibrium_set
+from compensation.loop_parameters import own_time
 from compensation.loop_section import LoopSection
 from compensation.orbits.periodic_orbits import Cycle, find_cycle
 from ident.model.doors import expect
@@ -27,11 +28,10 @@ from ident.model.friction import ModelError
 from ident.model.numbers import is_count, real_array, shown
 from ident.simulation.filippov_system import FloatArray
 
-DURATION: Final = 60.0  # [s] for which a start is followed
+PATIENCE: Final = 240.0  # times of the loop's own, for which a start is followed
 TOLERANCE: Final = 1e-9
 SAME: Final = 1e-3  # of the extent: cycles so alike are one
 LAST: Final = 6  # halts that must lie on the cycle
-RESTS_APART: Final = 1e-6  # [rad] beyond a piece of the equilibrium set a rest is still in it
 UNDECIDED: Final = -1
 
 Kind = Literal["set point", "equilibrium_set", "limit_cycle"]
@@ -106,10 +106,13 @@ def basins(
     loop: ClosedLoop,
     starts: Rectangle,
     *,
-    duration: float = DURATION,
+    duration: float | None = None,
     map: Map = map,
 ) -> Basins:
-    """Where the starts of a rectangle end up, each followed for `duration` [s] at most."""
+    """Where the starts of a rectangle end up, each followed for `duration` [s] at most.
+
+    Without a duration it is some hundred times as long as the loop's slowest time scale.
+    """
     expect("loop", loop, ClosedLoop, "eq 8")
     expect("starts", starts, Rectangle, "states of eq 8")
     ends = list(map(partial(where_it_settles, loop, duration=duration), iter(starts.starts())))
@@ -134,8 +137,15 @@ def basins(
     )
 
 
-def where_it_settles(loop: ClosedLoop, start: FloatArray, *, duration: float = DURATION) -> Attractor | None:
-    """The attractor that a start (3,) reaches within `duration` [s], None where it is not settled."""
+def where_it_settles(
+    loop: ClosedLoop, start: FloatArray, *, duration: float | None = None
+) -> Attractor | None:
+    """The attractor that a start (3,) reaches within `duration` [s], None where it is not settled.
+
+    Without a duration as for `basins`.
+    """
+    if duration is None:
+        duration = PATIENCE * own_time(loop.modes)
     run = simulate(loop, start, duration=duration, times=(), tolerance=TOLERANCE)
     if run.end_reason == "equilibrium":
         return _rest(loop, float(run.end_state[0]))
@@ -160,16 +170,13 @@ def where_it_settles(loop: ClosedLoop, start: FloatArray, *, duration: float = D
 
 
 def _rest(loop: ClosedLoop, x1: float) -> Attractor:
-    """The piece of the equilibrium set that holds x1 [rad]; what touches the set point is one piece."""
+    """The piece of the equilibrium set nearest to a rest x1 [rad]; what touches the set point is one."""
     segments = equilibrium_set(loop.robot, loop.controller).segments
     touching = [segment for segment in segments if segment.touches_zero]
     pieces = [(s.x1_min, s.x1_max) for s in segments if not s.touches_zero]
-    if touching:
-        pieces.append((min(0.0, *(s.x1_min for s in touching)), max(0.0, *(s.x1_max for s in touching))))
-    for low, high in pieces:
-        if low - RESTS_APART <= x1 <= high + RESTS_APART:
-            return Attractor("equilibrium_set", low, high)
-    return Attractor("set point", 0.0, 0.0)
+    pieces.append((min([0.0, *(s.x1_min for s in touching)]), max([0.0, *(s.x1_max for s in touching)])))
+    low, high = min(pieces, key=lambda piece: max(piece[0] - x1, x1 - piece[1]))
+    return Attractor("equilibrium_set" if low < high else "set point", low, high)
 
 
 def _same(one: Attractor, other: Attractor) -> bool:

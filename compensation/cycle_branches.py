@@ -26,6 +26,7 @@ from compensation.controller import GAIN_OF
 from compensation.cycle_ends import CycleEvent, Neighbourhood, crossing, end_of
 from compensation.cycle_modes import Stick, events_of, mode_sequence, stick_phases
 from compensation.loop_cycles import distance, mirrored
+from compensation.loop_parameters import own_time
 from compensation.loop_section import LoopSection, with_gain
 from compensation.loop_starts import start_sizes
 from compensation.orbits.continuation import Curve, CurveEvent, Steps, trace
@@ -38,7 +39,7 @@ from ident.simulation.filippov_system import FloatArray
 
 Gain = Literal["r", "L", "n1", "n2"]
 
-VANISHED: Final = 1e-5  # [rad] extent of a cycle that has become a point
+VANISHED: Final = 3e-5  # of the widest cycle: extent of one that has become a point
 MOST_BRANCHES: Final = 12
 SAME: Final = 1e-3  # relative difference of extremes and period: so near to a known branch, a cycle is on it
 BARELY: Final = 1e-9  # relative difference of gains that are one
@@ -166,8 +167,8 @@ def _follow(
         duration = float(np.sum(section(p).follow(x, cycle.returns).durations))
         return ", ".join(mode_sequence(events_of(section(p).loop, x, duration)))
 
-    equation = CycleEquation(section, cycle.returns, sequence, span, VANISHED)
-    scale = np.array([amplitude, amplitude, span[1] - span[0]])
+    equation = CycleEquation(section, cycle.returns, sequence, span, VANISHED * amplitude)
+    scale = np.array([amplitude, amplitude / own_time(loop.modes), span[1] - span[0]])
     up = np.array([0.0, 0.0, 1.0])
     ways = [
         trace(equation, (cycle.point, value), ahead=way, scale=scale, span=span, steps=steps)

@@ -5,7 +5,7 @@ Differences of coefficients, of robot and model, are exactly zero here where the
 
 from __future__ import annotations
 
-from math import exp, expm1
+from math import exp, expm1, sqrt
 from typing import Final
 
 from ident.simulation.compiled import compiled
@@ -15,8 +15,33 @@ from ident.simulation.filippov_system import FloatArray, Signs
 A1, A2, A3, K0, K2, KV, C1, C2, GAIN, SIGN2, SIGNV, WIDTH2, WIDTHV, SHAPE2, SHAPEV, ALIKE = range(16)
 RATE, GOAL, STIFF, DAMP, COULOMB, FADING, WIDTH, SHAPE, HIGH, LOW = range(10)
 ROWS: Final = 6
+SLIP_MODES: Final = 4
 COLUMNS: Final = 16
 SLOWEST: Final = 1e-12  # [1/s] stands for an observer without gain or damping, whose estimate never settles
+
+
+@compiled
+def own_time(parameters: FloatArray) -> float:
+    """The slowest time scale [s] of the loop with these parameters (6, 16), by which its motion is awaited.
+
+    Of robot and model: sqrt(J/n1), in which the link swings, and (b + n2)/n1, in which it creeps home.
+    """
+    slowest = 0.0
+    for mode in range(SLIP_MODES):
+        k = parameters[mode]
+        model, true = -k[C1], -k[C1] - k[A1]
+        swing = max(1.0 / sqrt(model), 1.0 / sqrt(true))
+        slowest = max(slowest, swing, -k[C2] / model, (-k[C2] - k[A2]) / true)
+    return float(slowest)
+
+
+@compiled
+def fastest_decay(parameters: FloatArray) -> float:
+    """L + b/J [1/s], the greater of both directions, at which an observer error decays: it limits a step."""
+    fastest = 0.0
+    for mode in range(SLIP_MODES):
+        fastest = max(fastest, -parameters[mode, A3])
+    return fastest
 
 
 @compiled

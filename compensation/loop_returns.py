@@ -19,6 +19,7 @@ import numpy as np
 from numba import boolean, float64, int64, types
 
 from compensation.loop_modes import MOTION, SURFACE_ROWS, SYSTEM
+from compensation.loop_parameters import fastest_decay, own_time
 from compensation.loop_runs import begin, is_analytic, run_at, run_for
 from compensation.loop_tangents import DEVIATIONS, ROW1, ROW2, ROW3, STATES, TANGENTS, stick_deviations
 from compensation.orbits.saltation import carry, project_along, saltate
@@ -31,6 +32,9 @@ from ident.simulation.taylor import ORDER, TAYLOR
 
 EVENT_STORE: Final = 256  # of a half turn: chattering beyond that is reported as no return
 STEP_LIMIT: Final = 5_000  # of a turn, which takes a few hundred
+STEPS_PER_DECAY: Final = 0.15  # where the observer is fast: a step spans some nine decay times of its error
+LONG_TURN: Final = 40.0  # times of the loop's own, that a turn may take at so small steps
+MOST_STEPS: Final = 500_000  # beyond: a turn at L = 1e6 of the paper's robot takes half of them
 MOST_HALTS: Final = 1000  # in a turn: a link that halts more often is chattering, not turning
 
 CARRY: Final = types.void(
@@ -104,6 +108,13 @@ def _map_addresses() -> tuple[int, int]:
     return address_of(returns, RETURNS), address_of(derivative, DERIVATIVE)
 
 
+@compiled
+def steps_allowed(parameters: FloatArray) -> int:
+    """Steps of a turn: more where the observer is fast."""
+    needed = STEPS_PER_DECAY * LONG_TURN * own_time(parameters) * fastest_decay(parameters)
+    return STEP_LIMIT + int(min(needed, float(MOST_STEPS)))
+
+
 @owning
 def returns(
     run: int,
@@ -117,9 +128,11 @@ def returns(
     """Follow the return map from `start` (3,) for as many returns as `points` has rows: (returns, reason).
 
     A row (5,): x1, x2 of the return, its duration [s], lowest and highest x1 on the way. In the symmetric map
-    every row stands in the frame of its own half turn: the way is followed by a change of sign. `patience`
-    [s] is for one half turn, `run` the address of a kernel of `loop_runs`.
+    every row stands in the frame of its own half turn: the way is followed by a change of sign. `patience` is
+    for one half turn, in times of the loop's own (`own_time`), `run` the address of a kernel of `loop_runs`.
     """
+    longest = patience * own_time(parameters)
+    limit = steps_allowed(parameters)
     state = np.empty(STATES)
     assign(state, start)
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
@@ -130,13 +143,13 @@ def returns(
         duration = 0.0
         low = high = state[0]
         returned = False
-        left = STEP_LIMIT
+        left = limit
         for _ in range(MOST_HALTS):
             before = state[0]
             end = run_at(
                 run,
                 (
-                    parameters, tolerance, patience, left, MOTION, 0, 1, 0.0, state, signs, contact,
+                    parameters, tolerance, longest, left, MOTION, 0, 1, 0.0, state, signs, contact,
                     times, states, times, which, modes, states,
                 ),
             )  # fmt: skip
@@ -173,9 +186,11 @@ def derivative(
     """Derivative (3, 2) of the half turn from the halt `state` (3,), which moves to the next halt.
 
     Its rows are those of x1, x2 and the duration [s], by x1 and x2. Returns the duration and why it ended.
-    `tangent_tolerance` is that of the deviations' steps; `run` and `carried` are the addresses of the kernels
-    that integrate and that carry deviations.
+    `tangent_tolerance` is that of the deviations' steps, `patience` as for `returns`; `run` and `carried` are
+    the addresses of the kernels that integrate and that carry deviations.
     """
+    longest = patience * own_time(parameters)
+    limit = steps_allowed(parameters)
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     begin(parameters, state, signs, contact)
     y = np.zeros(STATES * (1 + DEVIATIONS))
@@ -192,7 +207,7 @@ def derivative(
     end = run_at(
         run,
         (
-            parameters, tolerance, patience, STEP_LIMIT, MOTION, 0, 1, 0.0, state, signs, contact,
+            parameters, tolerance, longest, limit, MOTION, 0, 1, 0.0, state, signs, contact,
             np.empty(0), np.empty((0, STATES)), times, which, modes, states,
         ),
     )  # fmt: skip

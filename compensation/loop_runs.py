@@ -15,14 +15,13 @@ from numba import float64, int64, types
 
 from compensation.bell_series import BELL
 from compensation.loop_modes import MOTION, REVERSAL, SYSTEM, surfaces
-from compensation.loop_parameters import SHAPE2, SHAPEV
+from compensation.loop_parameters import SHAPE2, SHAPEV, SLIP_MODES
 from ident.simulation.compiled import address_of, calls, compiled, owning
 from ident.simulation.dormand_prince import DORMAND_PRINCE
 from ident.simulation.filippov_system import FloatArray, Signs, resolve, switching_value
 from ident.simulation.integrate import Progress, Record, Settings, integrate, memory_shape
 from ident.simulation.taylor import TAYLOR
 
-SLIP_MODES: Final = 4
 TOUCH: Final = "estimate touch"  # x2 comes to zero but for the tolerance, and keeps its sign
 SURFACES: Final = 2
 PROGRESS: Final = types.NamedTuple((float64, *4 * (int64,)), Progress)  # type: ignore[no-untyped-call]  # numba

@@ -25,7 +25,7 @@ TOLERANCE: Final = 1e-13  # of a step; series lose nothing by it
 TOLERANCE_ELSE: Final = 1e-11  # of a Dormand-Prince step
 REPEATS: Final = 1e-11  # relative distance of points that are the same
 STILL: Final = 1e-8  # of x1, by which a link still moves that closes in on the edge of an equilibrium set
-PATIENCE: Final = 200.0  # [s] for one half turn
+PATIENCE: Final = 800.0  # times of the loop's own, for one half turn
 
 
 @dataclass(frozen=True)

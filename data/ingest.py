@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data.alignment import align
+from data.began import began
 from data.csv.description import TIME_NAMES
 from data.csv.dialect import bare, sniff
 from data.csv.log import elapsed, find_column, read_csv, table_integrity
@@ -31,7 +32,7 @@ from data.protocols import ProtocolName
 from data.recording import Axis, Recording
 from data.resolution import lattice_spacing
 from data.screening import Signals as Run
-from data.screening import require_samples, screen
+from data.screening import require_count, require_samples, screen
 from data.signals import Clock, RigSignals, Signal, Signals, log_format
 from data.units import Quantity, known_unit, same_unit, si_word
 
@@ -49,6 +50,7 @@ class _Logged:
     clock: str
     metadata: Mapping[str, str]
     findings: tuple[Finding, ...]
+    begun: float | None  # from 1970 [s]
 
 
 @dataclass(frozen=True)
@@ -134,25 +136,51 @@ def read_recording(
     )
     if window is not None:
         run = _cut(run, window)
+    recording = screened_recording(
+        run, clock=logged.clock, axis=axis, encoder_counts=encoder_counts, torque_limit=torque_limit
+    )
+    return replace(
+        recording,
+        begun=logged.begun,
+        simulated=logged.metadata.get("simulated", "").strip().lower() == "true",
+        sha256=hashlib.sha256(content.data).hexdigest(),
+        metadata=logged.metadata,
+        findings=(*logged.findings, *recording.findings),
+    )
+
+
+def screened_recording(
+    run: Run,
+    *,
+    clock: str,
+    axis: Axis = "rotary",
+    encoder_counts: float | None = None,
+    torque_limit: float | None = None,
+) -> Recording:
+    """A run in SI as a recording, screened; `clock` says what its time is. Parameters as `read_recording`.
+
+    Raises
+    ------
+    LogError
+        When the screening refuses the run.
+    """
     require_samples(run)
-    resolution = _resolution(run.position, axis=axis, encoder_counts=encoder_counts)
-    screened = screen(run, clock=logged.clock, resolution=resolution, torque_limit=torque_limit)
+    resolution = _resolution(run, axis=axis, encoder_counts=encoder_counts)
+    screened = screen(run, clock=clock, resolution=resolution, torque_limit=torque_limit)
     kept = screened.signals
     return Recording(
-        log=log,
-        protocol=protocol,
+        log=run.log,
+        protocol=run.protocol,
         time=kept.time,
         position=kept.position,
         torque=kept.torque,
         velocity=kept.velocity,
         reference=kept.reference,
         resolution=resolution,
-        torque_limit=torque_limit,
+        torque_limit=screened.torque_limit,
         axis=axis,
-        simulated=logged.metadata.get("simulated", "").strip().lower() == "true",
-        sha256=hashlib.sha256(content.data).hexdigest(),
-        metadata=logged.metadata,
-        findings=(*logged.findings, *screened.findings),
+        findings=screened.findings,
+        breaks=kept.breaks,
     )
 
 
@@ -182,10 +210,15 @@ def read_bytes(path: Path, *, log: str) -> ByteArray:
     return np.frombuffer(mapped, np.uint8)
 
 
-def _resolution(position: FloatArray, *, axis: Axis, encoder_counts: float | None) -> float | None:
-    if encoder_counts is not None:
-        return (_TURN if axis == "rotary" else 1.0) / encoder_counts
-    return lattice_spacing(position[np.isfinite(position)])
+def _resolution(run: Run, *, axis: Axis, encoder_counts: float | None) -> float | None:
+    """One encoder count [rad], declared or found; raises LogError where the positions belie the declared."""
+    found = lattice_spacing(run.position[np.isfinite(run.position)])
+    if encoder_counts is None:
+        return found
+    declared = (_TURN if axis == "rotary" else 1.0) / encoder_counts
+    if found is not None:
+        require_count(run, found=found, declared=declared)
+    return declared
 
 
 def _cut(run: Run, window: tuple[float, float]) -> Run:
@@ -218,7 +251,8 @@ def _read_csv(door: _Door, content: ByteArray) -> _Logged:
     findings = integrity.require(door.log, salvage=door.salvage)
     name = layout.headers[columns["time"]] if layout.headers else str(columns["time"])
     clock = f"column {shown(name)!r}"
-    lead = unset_lead(door.convert("time", _interval(time), values.pop("time")))
+    stamps = door.convert("time", _interval(time), values.pop("time"))
+    lead = unset_lead(stamps)
     return _Logged(
         time=door.convert("time", _interval(time), elapsed(table, columns["time"], begin=lead)),
         signals={
@@ -227,6 +261,7 @@ def _read_csv(door: _Door, content: ByteArray) -> _Logged:
         clock=clock,
         metadata=layout.metadata,
         findings=(*findings, *_unset(door, lead, clock)),
+        begun=began(float(stamps[lead]) if stamps.size > lead else 0.0, layout.metadata),
     )
 
 
@@ -309,7 +344,8 @@ def _read_mcap(door: _Door, content: ByteArray) -> _Logged:
         seconds = door.convert("time", time, since_first(topic.ticks[lead:]))
     findings += _unset(door, lead, name)
     signals = {quantity: values[lead:] for quantity, values in signals.items()}
-    logged = _Logged(seconds, signals, name, read.metadata, tuple(findings))
+    begun = began(float(clock[lead]) / 1e9, read.metadata)
+    logged = _Logged(seconds, signals, name, read.metadata, tuple(findings), begun)
     return _after_first(logged)
 
 

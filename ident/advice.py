@@ -61,7 +61,7 @@ class NextRun:
 
 @dataclass(frozen=True)
 class Advice:
-    """The runs that narrow one quantity of one direction most, in the order of their worth."""
+    """The runs that narrow one quantity [rad/s, N m or 1/s] of one direction most, the best first."""
 
     direction: Direction
     quantity: Quantity
@@ -83,6 +83,8 @@ class Advice:
 
 @dataclass(frozen=True)
 class _Candidate:
+    """A run that may be advised: speed [rad/s], ramp rate [N m/s], duration [s]."""
+
     protocol: Literal["constant_velocity", "breakaway"]
     direction: Direction
     speed: float | None

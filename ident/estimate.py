@@ -50,7 +50,10 @@ class RunUse:
 
 @dataclass(frozen=True)
 class Covariance:
-    """Joint covariance of the free parameters, named 'inertia', 'positive.static_torque', ..."""
+    """Joint covariance of the free parameters, named 'inertia', 'positive.static_torque', ...
+
+    One law for both directions is named 'mean.static_torque', ..., with 'torque_offset'.
+    """
 
     names: tuple[str, ...]
     matrix: FloatArray  # (k, k) [product of the two parameters' units]
@@ -83,14 +86,25 @@ class IdentifiedRobot:
     axis: str = "rotary"
     simulated: bool = False
 
+    @property
+    def one_law(self) -> bool:
+        """Whether one law for both directions was fitted: the mean holds it, and neither direction."""
+        directions = (*self.positive.values(), *self.negative.values())
+        return all(entry.value is None for entry in directions) and any(
+            entry.value is not None for entry in self.mean.values()
+        )
+
+    def laws(self) -> Mapping[str, Mapping[str, Estimate]]:
+        """The laws that were fitted, by name: that of each direction, or the mean alone."""
+        return {"mean": self.mean} if self.one_law else {"positive": self.positive, "negative": self.negative}
+
     def robot(self) -> OneLinkRobot | None:
-        """The fitted asymmetric robot, or None where a parameter that it needs is withheld."""
-        if self.inertia.value is None:
+        """The fitted robot, or None where a parameter that it needs is withheld."""
+        curves = [_curve(law) for law in self.laws().values()]
+        positive, negative = curves[0], curves[-1]
+        if self.inertia.value is None or positive is None or negative is None:
             return None
-        curves = [_curve(self.positive), _curve(self.negative)]
-        if curves[0] is None or curves[1] is None:
-            return None
-        return OneLinkRobot(self.inertia.value, StribeckFriction(positive=curves[0], negative=curves[1]))
+        return OneLinkRobot(self.inertia.value, StribeckFriction(positive=positive, negative=negative))
 
     def draws(self, n: int, generator: np.random.Generator) -> tuple[OneLinkRobot, ...]:
         """Robots drawn from the joint normal of the estimate; those that break a rule of the law are redrawn.
@@ -100,13 +114,15 @@ class IdentifiedRobot:
         centre = self.robot()
         if centre is None:
             return ()
-        names = self.covariance.names
+        where = [k for k, name in enumerate(self.covariance.names) if name != "torque_offset"]
+        names = [self.covariance.names[k] for k in where]
+        matrix = self.covariance.matrix[np.ix_(where, where)]
         centres = np.array([_value(centre, name) for name in names])
         robots: list[OneLinkRobot] = []
         for _ in range(100 * n):
             if len(robots) == n:
                 break
-            drawn = generator.multivariate_normal(centres, self.covariance.matrix)
+            drawn = generator.multivariate_normal(centres, matrix)
             candidate = _replaced(centre, dict(zip(names, map(float, drawn), strict=True)))
             if candidate is not None:
                 robots.append(candidate)
@@ -122,14 +138,18 @@ def _curve(estimates: Mapping[str, Estimate]) -> StribeckCurve | None:
 def _value(robot: OneLinkRobot, name: str) -> float:
     if name == "inertia":
         return robot.inertia
-    direction, parameter = name.split(".")
-    return float(getattr(getattr(robot.friction, direction), parameter))
+    law, parameter = name.split(".")
+    curve = robot.friction.negative if law == "negative" else robot.friction.positive  # the mean is both
+    return float(getattr(curve, parameter))
 
 
 def _replaced(robot: OneLinkRobot, values: Mapping[str, float]) -> OneLinkRobot | None:
     curves = {}
     for direction in ("positive", "negative"):
-        own = {p: values.get(f"{direction}.{p}", _value(robot, f"{direction}.{p}")) for p in CURVE_PARAMETERS}
+        own = {
+            p: values.get(f"{direction}.{p}", values.get(f"mean.{p}", _value(robot, f"{direction}.{p}")))
+            for p in CURVE_PARAMETERS
+        }
         if own["coulomb_torque"] < 0 or own["static_torque"] < own["coulomb_torque"]:
             return None
         if own["stribeck_velocity"] <= 0 or own["stribeck_shape"] <= 0 or own["viscous_damping"] < 0:

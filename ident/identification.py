@@ -4,47 +4,54 @@
 responses (`ident.evidence`).
 2. A missing direction, a torque of the wrong sign, or as many parameters as data end it here.
 3. The law is fitted in one stage (`ident.fit`): values get intervals, or are withheld with a reason.
-4. Every log is listed with its use.
+4. Excitation logs (`ident.excitation`) give the law where nothing else does, else an inertia to compare.
+5. What was fitted is predicted from the rest (`ident.validation`).
+6. Every log is listed with its use.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+import numpy as np
 
 from data.findings import Finding, Severity
 from data.recording import Axis, Recording
 from ident.estimate import IdentifiedRobot
-from ident.evidence.friction_map import MapPoint
 from ident.evidence.gathering import (
     Evidence,
     IdentificationError,
     gather,
+    log_findings,
     require_evidence,
     run_findings,
     run_uses,
 )
 from ident.evidence.ripple_correction import ripple_findings
+from ident.excitation.excited_law import excited_law
+from ident.excitation.inverse_dynamics import Law
 from ident.fit.assumptions import DEFAULT, Assumptions
+from ident.fit.breakaway_summary import breakaway_summaries
+from ident.fit.circumstances import circumstances
+from ident.fit.cross_check import bootstrap_table
 from ident.fit.law_model import DIRECTIONS, SIGN
+from ident.fit.map_points import friction_map
 from ident.fit.one_stage import explain
-from ident.fit.weighting import Weighted
+from ident.fit.residual_findings import residual_findings
+from ident.from_excitation import from_excitation, with_excitation
+from ident.identified import Identification
+from ident.validation.summary import validate
 
 
-@dataclass(frozen=True)
-class Identification:
-    """The identified robot with what it rests on."""
+def identify(
+    recordings: Sequence[Recording],
+    *,
+    assumptions: Assumptions = DEFAULT,
+    generator: np.random.Generator | None = None,
+) -> Identification:
+    """Fit the friction law and the inertia to the recordings of one rig.
 
-    robot: IdentifiedRobot
-    friction_map: tuple[MapPoint, ...]
-    fit_report: str  # lmfit's own
-    evidence: Evidence  # used or not
-    weighted: Weighted
-
-
-def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFAULT) -> Identification:
-    """Fit the friction law of each direction and the inertia to the recordings of one rig.
-
+    With a generator, the report holds the intervals of a bootstrap over runs beside those of the profiles.
     A direction without usable steady runs is withheld. Raises `IdentificationError` where no law can be had:
     no usable run in either direction (E-DIRECTION), a torque of the wrong sign (E-SIGN), too few data
     (E-FEW).
@@ -53,15 +60,40 @@ def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFA
         raise IdentificationError("no recordings: nothing to identify. List logs under [[experiment]].")
     axis = _axis(recordings)
     evidence = gather(recordings)
+    excitations = [recording for recording in recordings if recording.protocol == "excitation"]
+    alone = bool(excitations) and not evidence.runs and not evidence.starts
+    law: Law = "each" if assumptions.laws == "each" else "one"
+    excited = excited_law(excitations, law=law, axis=axis) if excitations else "no excitation log"
+    if alone:
+        return from_excitation(recordings, evidence, excited)
+    found = _from_evidence(recordings, evidence, assumptions=assumptions, generator=generator)
+    return with_excitation(found, excited) if excitations else found
+
+
+def _from_evidence(
+    recordings: Sequence[Recording],
+    evidence: Evidence,
+    *,
+    assumptions: Assumptions,
+    generator: np.random.Generator | None,
+) -> Identification:
+    """The law from constant speeds, breakaways and frequency responses."""
+    axis = recordings[0].axis
     require_evidence(recordings, evidence)
     explained = explain(evidence, axis=axis, assumptions=assumptions)
     values = explained.values
     notes = [
-        *_log_findings(recordings),
+        *log_findings(recordings),
         *run_findings(evidence),
         *ripple_findings(evidence.waves, axis),
         *_missing_tests(evidence),
         *explained.findings,
+        *residual_findings(
+            explained.evidence,
+            explained.weighted,
+            circumstances(recordings, explained.evidence),
+            axis,
+        ),
     ]
     robot = IdentifiedRobot(
         inertia=values.inertia,
@@ -78,54 +110,19 @@ def identify(recordings: Sequence[Recording], *, assumptions: Assumptions = DEFA
         simulated=any(recording.simulated for recording in recordings),
     )
     weighted = explained.weighted
-    points = friction_map(explained.evidence, weighted)
-    return Identification(robot, points, explained.report, explained.evidence, weighted)
-
-
-def friction_map(evidence: Evidence, weighted: Weighted) -> tuple[MapPoint, ...]:
-    """Every steady run and then every breakaway as a point, used or not, in the order of the logs."""
-    points = []
-    data, used = weighted.data, iter(range(weighted.data.torque.size))
-    inertia = weighted.fit.values["inertia"] if data.has_inertia else 0.0
-    for run in evidence.runs:
-        number = next(used) if run.why is None else None
-        points.append(
-            MapPoint(
-                log=run.log,
-                protocol="constant_velocity",
-                direction=run.direction,
-                velocity=run.velocity,
-                torque=run.torque - inertia * run.acceleration,
-                stderr=None if number is None else float(data.run_stderr[number]),
-                velocity_stderr=run.velocity_stderr,
-                ramp_rate=None,
-                start_time=run.start_time,
-                end_time=run.end_time,
-                used=run.why is None,
-                why=run.why,
-            )
-        )
-    used = iter(range(data.start_torque.size))
-    for start in evidence.starts:
-        number = next(used) if start.why is None else None
-        torque = start.torque if number is None else start.direction * float(data.start_torque[number])
-        points.append(
-            MapPoint(
-                log=start.log,
-                protocol="breakaway",
-                direction=start.direction,
-                velocity=0.0,
-                torque=torque,
-                stderr=None if number is None else float(data.start_stderr[number]),
-                velocity_stderr=None,
-                ramp_rate=start.line.rate,
-                start_time=start.line.start_time,
-                end_time=start.onset_time,
-                used=start.why is None,
-                why=start.why,
-            )
-        )
-    return tuple(points)
+    evidence = explained.evidence
+    fit_report = explained.report
+    if generator is not None:
+        fit_report = f"{fit_report}\n\n{bootstrap_table(weighted.data, values, generator)}"
+    return Identification(
+        robot=robot,
+        friction_map=friction_map(evidence, weighted),
+        fit_report=fit_report,
+        evidence=evidence,
+        weighted=weighted,
+        breakaways=breakaway_summaries(evidence, weighted.data),
+        validation=validate(recordings, evidence, weighted),
+    )
 
 
 def _axis(recordings: Sequence[Recording]) -> Axis:
@@ -133,10 +130,6 @@ def _axis(recordings: Sequence[Recording]) -> Axis:
     if len(axes) > 1:
         raise IdentificationError("the logs mix a rotary and a linear axis: they are not of one rig")
     return recordings[0].axis
-
-
-def _log_findings(recordings: Sequence[Recording]) -> list[Finding]:
-    return [finding for recording in recordings for finding in recording.findings]
 
 
 def _missing_tests(evidence: Evidence) -> list[Finding]:

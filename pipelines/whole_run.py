@@ -45,7 +45,7 @@ from pipelines.settings.gains import (
 )
 from pipelines.settings.loop import LawChoice
 
-PICTURES = ("figure2", "figure4", "figure6", "figure7", "figure8", "figure9", "figure10")
+PICTURES = ("figure2", "validation", "figure4", "figure6", "figure7", "figure8", "figure9", "figure10")
 SWEEP_POINTS = 101
 
 
@@ -164,7 +164,7 @@ def _identified(
     campaign: Campaign, logs: ReadLogs, folder: ResultFolder, options: RunOptions, progress: Progress
 ) -> tuple[list[str], IdentifiedRobot]:
     tick = progress.stage("identifying", 1)
-    found = identify(logs, assumptions=options.assumptions)
+    found = identify(logs, assumptions=options.assumptions, seed=options.seed)
     tick(1)
     write_identification(
         found,

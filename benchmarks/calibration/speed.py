@@ -12,6 +12,7 @@ from typing import Final
 
 import lmfit
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.rows import Row, against, figure, in_turns
 from data.recording import FloatArray
@@ -81,7 +82,7 @@ def _map(generator: np.random.Generator) -> FitData:
     )
 
 
-def _by_lmfit(data: FitData, fit: FrictionFit, counts: FloatArray) -> FloatArray:
+def _by_lmfit(data: FitData, fit: FrictionFit, counts: NDArray[np.int64]) -> FloatArray:
     """The free parameters (p,) of one resample."""
     drawn = np.repeat(np.arange(data.torque.size), counts)
     parameters = lmfit.Parameters()
@@ -94,7 +95,7 @@ def _by_lmfit(data: FitData, fit: FrictionFit, counts: FloatArray) -> FloatArray
     return np.array([float(result.params[name].value) for name in fit.free])
 
 
-def _objective(data: FitData, drawn: np.ndarray) -> Callable[[lmfit.Parameters], FloatArray]:
+def _objective(data: FitData, drawn: NDArray[np.int64]) -> Callable[[lmfit.Parameters], FloatArray]:
     """Residuals of a resample, in standard errors."""
     parts = []
     for direction, sign in SIGN.items():

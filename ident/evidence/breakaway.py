@@ -12,7 +12,8 @@ That is the residual of the joint fit; for small v/v_s the delay is tau ln(...) 
 
 A motion is sustained if it covers 20 counts. Less, from one rest to the next, is pre-sliding or creep
 (E-CREEP). A start without a ramp (a step of torque, the end of a move) is no breakaway experiment. A start
-at the torque limit, or none at all there, is censored: it says F_s >= limit and gives no number (E-SAT).
+at the torque limit, or a rest under a torque held there, is censored: it says F_s >= limit and gives no
+number (E-SAT). Where no limit is declared, a flat top at the log's largest torque is one.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from data.recording import FloatArray, Recording
 from ident.evidence.segmentation import Stretch, grain, slow_spans, stretches
@@ -30,6 +32,7 @@ LEAST_SAMPLES = 12  # of a ramp
 STRAIGHT = 0.001  # part of the torque by which a ramp may bend off its line
 KEPT = 0.7  # part of the longest straight stretch that the line goes through
 AT_LIMIT = 0.99  # part of the torque limit
+FLAT = 0.3  # part of the band next to the log's largest torque by which a flat top may rise
 
 
 @dataclass(frozen=True)
@@ -77,9 +80,71 @@ def breakaways(recording: Recording) -> tuple[Breakaway, ...]:
     for number, rest in enumerate(still):
         after = still[number + 1].first if number + 1 < len(still) else recording.time.size
         start = _start(recording, rest, after)
-        if start is not None:
+        moved = None if start is None or start.travel == 0.0 else start.direction
+        until = rest.last if start is None or moved is None else start.onset
+        held = [_held_at_limit(recording, rest.first, until, sign) for sign in (1, -1) if sign != moved]
+        found += [own for own in held if own is not None]
+        if start is not None and (moved or not any(held)):
             found.append(start)
     return tuple(found)
+
+
+def _held_at_limit(recording: Recording, first: int, past: int, direction: int) -> Breakaway | None:
+    """The censored start of a link that rests under the torque limit in a direction; None where it does not.
+
+    Judged on means over a few samples, so that noise alone reaches no limit.
+    """
+    if past - first < 2 * LEAST_SAMPLES:
+        return None
+    smooth = np.convolve(direction * recording.torque, np.full(LEAST_SAMPLES, 1 / LEAST_SAMPLES), "valid")
+    limit = recording.torque_limit
+    top = float(np.max(smooth)) if limit is None else limit
+    own = smooth[first : past - LEAST_SAMPLES + 1]
+    noise, _ = _texture(recording.torque)
+    near = AT_LIMIT * top - (3.0 * noise * LEAST_SAMPLES**-0.5 if limit is None else 0.0)
+    reached = _longest_run(own >= near)
+    if (
+        top <= 0.0
+        or reached.size == 0
+        or (limit is None and not _flat(recording, first + reached, top - near))
+    ):
+        return None
+    where = first + int(reached[0])
+    at_least = float(np.mean(own[reached]))
+    return Breakaway(
+        log=recording.log,
+        direction=direction,
+        line=RampLine(direction * at_least, float("nan"), 0.0, float(recording.time[first])),
+        travel=0.0,
+        travel_stderr=0.0,
+        place=float(np.median(recording.position[where : where + LEAST_SAMPLES])),
+        onset_time=float(recording.time[where]),
+        onset=where,
+        end=past,
+        end_time=float(recording.time[min(past, recording.time.size) - 1]),
+        why=f"E-SAT: the link rests at the torque limit: F_s >= {at_least:.4g}, not a number. "
+        "Raise the limit.",
+    )
+
+
+def _longest_run(holds: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Indices of the longest stretch over which it holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(np.int8)))
+    runs = edges.reshape(-1, 2)
+    if runs.size == 0:
+        return np.zeros(0, dtype=np.int64)
+    first, past = runs[int(np.argmax(runs[:, 1] - runs[:, 0]))]
+    return np.arange(first, past, dtype=np.int64)
+
+
+def _flat(recording: Recording, reached: NDArray[np.int64], band: float) -> bool:
+    """Whether the torque surely stays over the samples (n,) next to its top: a ramp would cross the band."""
+    if reached.size < 5 * LEAST_SAMPLES:
+        return False
+    part = slice(int(reached[0]) + LEAST_SAMPLES, int(reached[-1]))
+    line, _ = _line(recording.time[part], recording.torque[part], 0.0, 0.0)
+    span = float(recording.time[part][-1] - recording.time[part][0])
+    return bool(max(2.0 * line.stderr, abs(line.rate) * span) < FLAT * band)
 
 
 def _start(recording: Recording, rest: Stretch, after: int) -> Breakaway | None:
@@ -93,7 +158,7 @@ def _start(recording: Recording, rest: Stretch, after: int) -> Breakaway | None:
     searched = rest.last - late.size - rest.first
     far = np.flatnonzero(np.abs(away[searched:]) >= max(SUSTAINED_COUNTS * resolution, 2.0 * least))
     if far.size == 0:
-        return _no_start(recording, rest, place, float(np.max(np.abs(away))) / resolution)
+        return _creep(recording, rest, place, float(np.max(np.abs(away))) / resolution)
     sustained = int(far[0]) + searched
     direction = 1 if away[sustained] > 0 else -1
     before = int(np.flatnonzero(direction * away[: sustained + 1] < least)[-1])
@@ -135,28 +200,16 @@ def _objection(recording: Recording, start: Breakaway) -> str | None:
     return None
 
 
-def _no_start(recording: Recording, rest: Stretch, place: float, counts: float) -> Breakaway | None:
-    """A rest that ends in no sustained motion: creep under a ramp, a torque at its limit, or nothing."""
+def _creep(recording: Recording, rest: Stretch, place: float, counts: float) -> Breakaway | None:
+    """A rest that ends in no sustained motion, though it has crept under a ramp; None without either."""
     last = min(rest.last, recording.time.size) - 1
-    smooth = recording.torque[max(rest.first, last - LEAST_SAMPLES) : last + 1]
-    line = RampLine(float(np.mean(smooth)), float("nan"), 0.0, float(recording.time[rest.first]))
-    limit = recording.torque_limit
-    peak = float(np.max(np.abs(recording.torque[rest.first : last + 1])))
-    if limit is not None and peak >= AT_LIMIT * limit:
-        side = recording.torque[rest.first + int(np.argmax(np.abs(recording.torque[rest.first : last + 1])))]
-        line = replace(line, torque=float(np.sign(side)) * limit)
-        why = f"E-SAT: the link rests at the torque limit: F_s >= {limit:.4g}, not a number. Raise the limit."
-    elif counts >= ONSET_COUNTS and np.isfinite(_ramp_line(recording, rest.first, last + 1).stderr):
-        why = (
-            f"E-CREEP: {counts:.0f} counts of travel and no sustained motion: pre-sliding, not a breakaway. "
-            "Ramp on until the link runs."
-        )
-    else:
+    if counts < ONSET_COUNTS or not np.isfinite(_ramp_line(recording, rest.first, last + 1).stderr):
         return None
+    torque = float(np.mean(recording.torque[max(rest.first, last - LEAST_SAMPLES) : last + 1]))
     return Breakaway(
         log=recording.log,
-        direction=1 if line.torque > 0 else -1,
-        line=line,
+        direction=1 if torque > 0 else -1,
+        line=RampLine(torque, float("nan"), 0.0, float(recording.time[rest.first])),
         travel=0.0,
         travel_stderr=0.0,
         place=place,
@@ -164,7 +217,8 @@ def _no_start(recording: Recording, rest: Stretch, place: float, counts: float) 
         onset=last,
         end=last + 1,
         end_time=float(recording.time[last]),
-        why=why,
+        why=f"E-CREEP: {counts:.0f} counts of travel and no sustained motion: pre-sliding, not a breakaway. "
+        "Ramp on until the link runs.",
     )
 
 

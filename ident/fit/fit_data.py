@@ -13,6 +13,7 @@ from ident.evidence.momentum import NODES, Momentum
 from ident.fit.bounded_least_squares import Box, Workspace, workspace
 from ident.fit.law_model import SIGN, LawModel
 from ident.fit.normal_equations import OFFSET, ROW, Motions, Problem, Steady
+from ident.fit.ramp_rates import RateTrend
 
 LEAST_SHAPE, LARGEST_SHAPE = 0.05, 8.0  # of beta
 UNFELT = 1e-2  # of the slowest speed: a Stribeck velocity that no run feels, e^-100
@@ -31,16 +32,17 @@ class FitData:
     acceleration: FloatArray  # (n,) along the motion [rad/s^2]
     run_stderr: FloatArray  # (n,) [N m]
     start_direction: NDArray[np.int64]  # (m,)
-    start_torque: FloatArray  # (m,) less the ramp's rise up to the detection [N m]
+    start_torque: FloatArray  # (m,) at the onset and at zero ramp rate [N m]
     start_stderr: FloatArray  # (m,) [N m]
     momenta: tuple[Momentum, ...]
     whitening: tuple[FloatArray, ...]  # (k, k) for each momentum: the inverse square root of its covariance
     inertia: tuple[float, float] | None  # from the frequency response, with its standard error
+    trend: RateTrend | None = None  # over the ramp rates, that the start torques are less of
     # (g, n + m): of the variance of each run, then each breakaway, the part that each estimated spread makes
-    shares: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
-    motion_dof: float = np.inf  # behind the scale of the momenta's covariance
-    longest: float = STRAIGHT  # v_s that the fit may try, in parts of the fastest speed
-    inertia_dof: float = np.inf  # behind the standard error of the frequency response's inertia
+    shares: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))  # [-]
+    motion_dof: float = np.inf  # behind the scale of the momenta's covariance [-]
+    longest: float = STRAIGHT  # v_s that the fit may try, in parts of the fastest speed [-]
+    inertia_dof: float = np.inf  # behind the standard error of the frequency response's inertia [-]
 
     @property
     def has_inertia(self) -> bool:

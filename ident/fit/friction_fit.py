@@ -251,10 +251,11 @@ def _covariance(data: FitData, x: FloatArray) -> FloatArray:
 
 def _starts(data: FitData) -> FloatArray:
     """Starts from the linear problem on a grid of v_s: the local minima first, then the rest spread out."""
-    ranked = [_ranked(data, law) for law in data.model.laws]
+    blank = _blank(data)
+    ranked = [_ranked(data, law, blank) for law in data.model.laws]
     starts = []
     for number in range(STARTS):
-        x = _blank(data)
+        x = blank.copy()
         for law, choices in zip(data.model.laws, ranked, strict=True):
             place = data.model.place(law)
             x[place : place + len(BLOCK)] = choices[number % len(choices)]
@@ -272,7 +273,7 @@ def _blank(data: FitData) -> FloatArray:
     return x
 
 
-def _ranked(data: FitData, law: LawName) -> list[FloatArray]:
+def _ranked(data: FitData, law: LawName, blank: FloatArray) -> list[FloatArray]:
     """Blocks of one law: the best linear law of runs and breakaways for each v_s, best minima first."""
     place = data.model.place(law)
     velocity = place + BLOCK.index("stribeck_velocity")
@@ -280,7 +281,7 @@ def _ranked(data: FitData, law: LawName) -> list[FloatArray]:
     moving = data.speed[own]
     steady = replace(data, momenta=(), whitening=())
     largest = float(np.max(np.abs(data.torque[own])))
-    points = np.tile(_blank(data), (GRID, 1))
+    points = np.tile(blank, (GRID, 1))
     points[:, place] = points[:, place + 1] = 0.5 * largest
     points[:, velocity] = np.linspace(np.log(0.3 * moving.min()), np.log(2.0 * moving.max()), GRID)
     free = np.zeros(points.shape[1], dtype=np.bool_)

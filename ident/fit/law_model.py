@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final, Literal
 
 Direction = Literal["positive", "negative"]
@@ -37,7 +38,7 @@ class LawModel:
         """The directions that have a law."""
         return tuple(direction for direction in DIRECTIONS if self.law_of(direction) is not None)
 
-    @property
+    @cached_property
     def names(self) -> tuple[str, ...]:
         """All parameters: 'inertia', 'torque_offset', 'positive_coulomb_torque', ..., block after block."""
         return (*COMMON, *(f"{law}_{name}" for law in self.laws for name in BLOCK))

@@ -89,7 +89,7 @@ def chosen_shape(evidence: Evidence, model: LawModel) -> ShapeChoice:
         + ". Values and intervals are conditional on the choice."
     )
     chosen = replace(model, free_shape=best.model.free_shape)
-    return ShapeChoice(chosen, table, Finding("E-LACKOFFIT", Severity.WARN, text))
+    return ShapeChoice(chosen, table, Finding("E-SHAPE", Severity.WARN, text))
 
 
 def _affords(evidence: Evidence, model: LawModel, law: LawName) -> bool:

@@ -20,12 +20,15 @@ from ident.estimate import Estimate
 from ident.evidence.frequency_response import LEAST_SPEED_RATIO, FrequencyInertia
 from ident.evidence.gathering import Evidence
 from ident.fit.assumptions import Assumptions
+from ident.fit.censoring import with_bounds
 from ident.fit.confidence import quantile
 from ident.fit.friction_fit import polished
 from ident.fit.law_model import DIRECTIONS, Direction, LawModel, LawName
 from ident.fit.law_shape import chosen_shape, shape_findings
 from ident.fit.missing_direction import Missing, missing_directions, of_directions
+from ident.fit.one_law import one_law_findings
 from ident.fit.parameters import UNITS, Parameters, parameters
+from ident.fit.ramp_rates import trend_finding
 from ident.fit.second_minimum import minimum_findings, without_disputed
 from ident.fit.small_samples import certainty
 from ident.fit.stribeck_effect import where_it_shows
@@ -77,9 +80,12 @@ def explain(evidence: Evidence, *, axis: Axis, assumptions: Assumptions) -> Expl
     fit, report = polished(weighted.data, weighted.fit)
     values = parameters(weighted.data, fit, axis=axis, missing=missing.reasons)
     weighted = replace(weighted, fit=values.fit)
-    values = without_disputed(values)
+    values = with_bounds(without_disputed(values), evidence)
     findings += shape_findings(weighted) if assumptions.shape == "fixed" else []
     findings += [] if choice is None else [choice.finding]
+    findings += one_law_findings(evidence, model)
+    if weighted.data.trend is not None:
+        findings.append(trend_finding(weighted.data.trend, unit=UNITS[axis]["static_torque"]))
     findings += [*values.findings, *minimum_findings(values), *_offset_finding(values, axis)]
     report = report if choice is None else f"{report}\n\n{choice.table}"
     return Explained(evidence, weighted, values, sources, report, tuple(findings))

@@ -76,7 +76,7 @@ def parameters(
         own = np.array([combination.get(name, 0.0) for name in fit.free])
         return quantile(known.dof(own)) ** 2 * known.inflation(own)
 
-    wanted = _combinations(fit)
+    wanted = combinations(fit)
     better, found = profiles(data, fit, wanted, height=height)
     found = with_unseen_effect(data, found, wanted, height=height)
     if better is not fit:
@@ -108,13 +108,13 @@ def parameters(
     )
 
 
-def _combinations(fit: FrictionFit) -> dict[str, Combination]:
+def combinations(fit: FrictionFit) -> dict[str, Combination]:
     """Every parameter that has a finite error, and the means of two directions, as the fit has them."""
     felt = {name for name, gone in zip(fit.free, np.isinf(np.diag(fit.covariance)), strict=True) if not gone}
     wanted: dict[str, Combination] = {name: {name: 1.0} for name in COMMON}
     own = {law: law_combinations(law) for law in fit.model.laws}
-    for law, combinations in own.items():
-        wanted |= {f"{law}.{name}": combination for name, combination in combinations.items()}
+    for law, parts in own.items():
+        wanted |= {f"{law}.{name}": combination for name, combination in parts.items()}
     if set(own) == set(DIRECTIONS):
         for name in CURVE_PARAMETERS:
             both = {**own["positive"][name], **own["negative"][name]}

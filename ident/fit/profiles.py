@@ -70,6 +70,7 @@ def profiles(
 def _profile(
     data: FitData, fit: FrictionFit, combination: Combination, *, height: float
 ) -> tuple[Profile, FrictionFit | None]:
+    """The profile, and the better fit that it has led to, if it has."""
     problem, box, work = data.problem, data.box, data.work
     best, cost = vector(data, fit.values)[None, :], np.zeros(1)
     refit_each(problem, best, box, work, cost)

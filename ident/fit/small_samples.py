@@ -41,7 +41,8 @@ DEPENDENT = 1e-10  # singular value, of the largest, below which slopes are depe
 class Certainty:
     """What errors that were estimated themselves make of the covariance of p free parameters.
 
-    The parameters that the data do not feel keep their infinite variance.
+    The parameters that the data do not feel keep their infinite variance. Covariances are in the products
+    of the parameters' units [SI].
     """
 
     plain: FloatArray  # (p, p) C, as if the spreads were known

@@ -27,6 +27,7 @@ from ident.fit.friction_fit import (
     start_inertia,
 )
 from ident.fit.law_model import SIGN, Direction, LawModel
+from ident.fit.ramp_rates import rate_trend
 from ident.fit.variance_model import Spread, averaged_out, members, spread_of, white_variance
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
@@ -195,7 +196,7 @@ def _own_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatA
     runs = evidence.used_runs
     speed = np.array([run.velocity_stderr for run in runs])
     place = np.array([run.place_stderr for run in runs])
-    return np.asarray(white_variance(runs) + place**2 + (_slopes(data, fit) * speed) ** 2)
+    return np.asarray(white_variance(runs) + place**2 + (law_slopes(data, fit) * speed) ** 2)
 
 
 def _start_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatArray:
@@ -216,12 +217,19 @@ def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: Spre
     part[:runs] = averaged_out(travel, spread.wavelength)
     by_group = members(data.run_direction, data.start_direction) * part * spread.variances[:, None]
     total = known + by_group.sum(axis=0)
+    start_stderr = np.sqrt(total[runs:])
+    rate = np.array([abs(start.line.rate) for start in evidence.used_starts])
+    trend = rate_trend(data.start_direction, rate, start_torque, start_stderr)
+    if trend is not None:
+        start_torque = start_torque - trend.excess
+        start_stderr = start_stderr * trend.widening(data.start_direction)
     scale, dof = _motion_scale(data.momenta, fit, spread)
     return replace(
         data,
         run_stderr=np.sqrt(total[:runs]),
         start_torque=start_torque,
-        start_stderr=np.sqrt(total[runs:]),
+        start_stderr=start_stderr,
+        trend=trend,
         shares=by_group / total,
         motion_dof=dof,
         whitening=tuple(
@@ -230,7 +238,7 @@ def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: Spre
     )
 
 
-def _slopes(data: FitData, fit: FrictionFit) -> FloatArray:
+def law_slopes(data: FitData, fit: FrictionFit) -> FloatArray:
     """The law's slope at each run (n,) [N m s/rad]."""
     slope = np.zeros_like(data.torque)
     for direction in data.model.directions:

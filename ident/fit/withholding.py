@@ -110,7 +110,7 @@ def withheld(
         if low < LEAST_SPEEDS and not np.any(_of(data, law, data.start_direction)):
             withhold("E-LOWSPEED", ("static_torque",), text)
     begun = np.any(_of(data, law, data.start_direction))
-    if not begun and not line and _loose(coulomb + stribeck, interval["static_torque"]):
+    if not begun and (line or _loose(coulomb + stribeck, interval["static_torque"])):
         withhold(
             "E-LOWSPEED",
             ("static_torque",),

@@ -3,8 +3,9 @@
 numba's own cache key covers the file of the kernel alone: a kernel goes on answering with old machine
 code after a function that it calls from another file was edited. The cache here adds to the key a digest
 of everything that a kernel reaches by name: the source files of all kernels that it calls, directly or
-through others, and the values of the constants that they use. The digest is taken when a signature is
-compiled or loaded, so the order of definitions does not matter.
+through others, and of what generates machine code for them, the fields of named tuples, and the values of
+the constants that they use, numba's types among them. The digest is taken when a signature is compiled or
+loaded, so the order of definitions does not matter.
 
 Three decorators:
 
@@ -201,16 +202,27 @@ def reach_digest(function: Callable[..., object]) -> str:
         files.add(current.__code__.co_filename)
         for name, value in sorted(_reached(current), key=lambda pair: pair[0]):
             for item in _flat(value):
-                kernel = item.kernel if isinstance(item, _Passed) else item
-                if isinstance(kernel, Dispatcher):
-                    pending.append(kernel.py_func)
+                source = _source(item)
+                if source is not None:
+                    pending.append(source)
                 elif isinstance(item, np.ndarray):
                     digest.update(f"{name}{item.dtype}{item.shape}".encode() + item.tobytes())
-                elif isinstance(item, (bool, int, float, complex, str)):
+                elif isinstance(item, (bool, int, float, complex, str, numba_types.Type, Signature)):
                     digest.update(f"{name}={item!r}".encode())
+                elif hasattr(item, "_fields"):
+                    digest.update(f"{name}{item._fields}".encode())
     for file in sorted(files):
         digest.update(_contents(file))
     return digest.hexdigest()
+
+
+def _source(item: Any) -> Callable[..., object] | None:
+    """The Python function of a kernel, passed or not, or that which generates its machine code."""
+    kernel = item.kernel if isinstance(item, _Passed) else item
+    if isinstance(kernel, Dispatcher):
+        return cast("Callable[..., object]", kernel.py_func)
+    made_by = getattr(item, "_defn", None)  # where numba's intrinsics keep it
+    return cast("Callable[..., object] | None", made_by)
 
 
 def _flat(value: Any) -> Iterator[Any]:

@@ -15,12 +15,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
 from ident.evidence.friction_map import MapPoint
 from ident.model.friction import StribeckCurve
 from ident.model.robot import OneLinkRobot
 from pipelines.report.axis_units import units_of
+from pipelines.report.speed_axis import speed_axis
 from pipelines.report.style import BLUE, INK, VERMILLION, key, new_figure, styled, zero_lines
 
 _COLOUR: Final = {1: BLUE, -1: VERMILLION}
@@ -78,15 +78,7 @@ def _draw_slow(axes: Axes, points: Sequence[MapPoint], robot: OneLinkRobot | Non
     if robot is not None:
         velocities = [curve.stribeck_velocity for _, curve in _curves(robot)]
         fastest = max(min(fastest, _STRIBECK_RANGE * max(velocities)), 2.0 * slowest)
-    floor = 0.8 * slowest  # below it the axis is linear, so that it reaches rest
-    axes.set_xscale("symlog", linthresh=floor, linscale=0.35)
-    axes.set_xlim(-0.12 * floor, 1.15 * fastest)
-    decades = np.asarray(LogLocator(subs=(1.0,)).tick_values(floor, fastest))
-    axes.xaxis.set_major_locator(FixedLocator([0.0, *decades[decades > floor]]))
-    between = np.asarray(LogLocator(subs=range(2, 10)).tick_values(floor, fastest))
-    axes.xaxis.set_minor_locator(FixedLocator(list(between[between > floor])))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    floor = speed_axis(axes, slowest=slowest, fastest=fastest)
     if robot is not None:
         speed = np.concatenate(([0.0], np.geomspace(1e-2 * floor, 1.15 * fastest, 400)))
         for direction, curve in _curves(robot):

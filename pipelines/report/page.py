@@ -45,7 +45,7 @@ def report_page(
 
     `robot`, `design`, `diagram`, `comparison`, `manifest` and `truth` as their JSON files hold them;
     `left_out` says of "predict" and "compare" why there is no answer; `figures` maps "figure2" ... "figure10"
-    to SVG text. Raises `PictureError` for a picture that this tool
+    and "validation" to SVG text. Raises `PictureError` for a picture that this tool
     cannot have made.
     """
     units = units_of(axis)

@@ -7,10 +7,14 @@ whether it was used and why not, `notes` the findings. Beside these, for the que
 - `axis` ("rotary" or "linear") and `simulated` (the logs came from a virtual rig);
 - `covariance`: `{"names": ["inertia", "positive.static_torque", ...], "matrix": [[...]]}`, the joint
   covariance of the free parameters in the units of their product, from which prediction intervals are drawn;
+  where one law for both directions was fitted its names are "mean.static_torque", ..., "torque_offset";
 - `profiles`: by name as in `covariance`, and for those of `mean`, `{"value": [...], "rise": [...]}`: points
   of the profile likelihood, from low values to high, and the rise of chi-square over its least, all other
   parameters refitted. A 95 % interval ends where it has risen by the square of Student's quantile;
 - `inertia_sources`: the inertia by each protocol that gave one;
+- `breakaways`: how F_s was measured, one entry a direction: `{"direction", "used", "censored", "torque",
+  "spread", "ramp_rates", "places"}`, pairs of the least and the greatest;
+- `validation`: how well runs that the fit had not seen are predicted (`pipelines.results.validation_entry`);
 - `campaign`: `{"name", "rig", "loop"}`, where `loop` holds the gains, the sampling and the compensator of the
   campaign's set-point runs, so far as one value holds for all of them, else null.
 
@@ -22,7 +26,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NoReturn
@@ -39,9 +43,11 @@ from ident.estimate import (
     ProfilePoints,
     RunUse,
 )
+from ident.fit.breakaway_summary import BreakawaySummary
 from ident.model import published
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
+from ident.validation.summary import Validation
 from pipelines.exit_status import RefusalError
 from pipelines.results.folder import Owner, ResultFolder
 from pipelines.results.robot_schema import (
@@ -51,6 +57,7 @@ from pipelines.results.robot_schema import (
     EstimateEntry,
     RobotDocument,
 )
+from pipelines.results.validation_entry import validation_entry
 from pipelines.settings.loop import Compensator, LawChoice, LoopDefaults
 
 ROBOT_SCHEMA: Final = "stribeck/robot/1"
@@ -106,8 +113,7 @@ class RobotFile:
 def withheld_parameters(robot: IdentifiedRobot) -> list[str]:
     """A sentence for each parameter that the robot needs and that is withheld."""
     entries = {"inertia": robot.inertia}
-    entries |= {f"positive.{name}": robot.positive[name] for name in CURVE_PARAMETERS}
-    entries |= {f"negative.{name}": robot.negative[name] for name in CURVE_PARAMETERS}
+    entries |= {f"{key}.{name}": law[name] for key, law in robot.laws().items() for name in CURVE_PARAMETERS}
     return [f"{name} is withheld: {entry.withheld}" for name, entry in entries.items() if entry.value is None]
 
 
@@ -146,7 +152,14 @@ def read_robot(source: str | Path) -> RobotFile:
     )
 
 
-def write_robot(folder: ResultFolder, robot: IdentifiedRobot, loop: LoopDefaults) -> Path:
+def write_robot(
+    folder: ResultFolder,
+    robot: IdentifiedRobot,
+    loop: LoopDefaults,
+    *,
+    breakaways: Sequence[BreakawaySummary] = (),
+    validation: Validation | None = None,
+) -> Path:
     """Write robot.json into the folder of the robot's campaign."""
     estimates: dict[str, object] = {"inertia": robot.inertia}
     for direction, entries in (
@@ -164,6 +177,8 @@ def write_robot(folder: ResultFolder, robot: IdentifiedRobot, loop: LoopDefaults
         "covariance": {"names": robot.covariance.names, "matrix": robot.covariance.matrix},
         "profiles": robot.profiles,
         "campaign": {"name": folder.owner.campaign, "rig": folder.owner.rig, "loop": loop},
+        "breakaways": list(breakaways),
+        "validation": None if validation is None else validation_entry(validation),
         "runs": robot.runs,
         "notes": robot.notes,
     }

@@ -12,10 +12,10 @@ from data.recording import Recording
 from ident.estimate import CURVE_PARAMETERS, Estimate
 from ident.evidence.gathering import IdentificationError
 from ident.fit.assumptions import Assumptions
-from ident.identification import Identification, identify
+from ident.identification import identify
+from ident.identified import Identification
 from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
-from ident.validation import reduced_chi_square, residual_table
 from tests.ident.rigs import Rig, multisine
 
 TOLERANCE = {
@@ -127,11 +127,13 @@ def test_the_truth_is_recovered(name: str, with_response: bool) -> None:
     assert all("response" in log for log in refused)  # a coarse encoder may not resolve the shortest
     assert "breakaway" in found.robot.inertia_sources
     assert "frequency_response" not in found.robot.inertia_sources or with_response
-    robot = found.robot.robot()
-    assert robot is not None
-    table = residual_table(found.friction_map, robot.friction)
-    assert len(table) == len(found.friction_map)
-    assert 0.2 < reduced_chi_square(table, 8) < 2.0
+    validation = found.validation
+    assert validation is not None
+    held_out = validation.held_out
+    assert len(held_out.points) == len(found.friction_map)
+    assert held_out.standardised_rms is not None
+    assert 0.4 < held_out.standardised_rms < 1.5
+    assert len(validation.ramps) == 12
 
 
 def test_one_log_of_all_speeds_and_one_of_all_ramps_are_enough() -> None:

@@ -18,8 +18,9 @@ from tests.pipelines.conftest import Finished
 
 RUN_FILES = {
     "robot.json", "friction_map.csv", "fit_report.txt", "table1.csv", "table1.md", "table1.tex",
-    "figure2.svg", "design.json", "figure4.svg", "figure8.svg", "diagram.csv", "diagram.json",
-    "figure9.svg", "comparison.json", "comparison.csv", "figure10.svg", "report.html", "manifest.json",
+    "figure2.svg", "validation.svg", "design.json", "figure4.svg", "figure8.svg", "diagram.csv",
+    "diagram.json", "figure9.svg", "comparison.json", "comparison.csv", "figure10.svg", "report.html",
+    "manifest.json",
 }  # fmt: skip
 HEAVY = ("numpy", "scipy", "pandas", "numba", "matplotlib", "lmfit", "pydantic", "mcap", "jinja2")
 

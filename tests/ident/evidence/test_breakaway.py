@@ -36,12 +36,35 @@ def test_the_delay_matters_for_a_coarse_encoder() -> None:
     assert start.torque > 1.03 * rig.robot.friction.positive.static_torque
 
 
-def test_a_breakaway_at_the_limit_is_censored() -> None:
-    rig = Rig(torque_limit=0.5)
-    found = breakaways(rig.ramps([0.2], np.random.default_rng(3)))
-    assert found
-    assert all(start.is_censored for start in found)
-    assert "F_s >= 0.5" in str(found[0].why)
+@pytest.mark.parametrize("declared", [True, False])
+def test_a_ramp_that_ends_at_the_limit_is_censored_and_the_other_direction_stands(declared: bool) -> None:
+    rig = Rig(torque_limit=0.55)  # between the two static torques
+    recording = rig.ramps([0.2, -0.2, 0.3], np.random.default_rng(3))
+    found = breakaways(recording if declared else replace(recording, torque_limit=None))
+    assert [(start.direction, start.is_censored) for start in found] == [(1, True), (-1, False), (1, True)]
+    for start in found:
+        if start.is_censored:
+            assert start.torque == pytest.approx(0.55, rel=0.01)
+            assert f"F_s >= {start.torque:.4g}" in str(start.why)
+
+
+def test_a_slow_ramp_is_no_flat_top() -> None:
+    recording = Rig(torque_noise=0.02).ramps([0.01], np.random.default_rng(8))
+    assert [start.why for start in breakaways(recording)] == [None]
+
+
+def test_an_encoder_that_drifts_does_not_move_the_onset() -> None:
+    rig = Rig(torque_noise=0.005)
+    recording = rig.ramps([0.1, -0.1], np.random.default_rng(7))
+    count = recording.resolution or 1.0
+    drifted = np.round((recording.position + 2e-4 * recording.time) / count) * count
+    found = breakaways(replace(recording, position=drifted))
+    assert [start.why for start in found] == [None, None]
+    directions: tuple[Direction, Direction] = ("positive", "negative")
+    for start, direction in zip(found, directions, strict=True):
+        delay = breakaway_delay(rig.robot, direction=direction, ramp_rate=0.1, travel=start.travel)
+        truth = getattr(rig.robot.friction, direction).static_torque
+        assert abs(start.torque) - 0.1 * delay == pytest.approx(truth, rel=0.003)
 
 
 def test_a_step_of_torque_is_no_breakaway() -> None:

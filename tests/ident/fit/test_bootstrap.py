@@ -21,14 +21,14 @@ def _drawn(data: FitData, steady: np.ndarray, motions: np.ndarray) -> FitData:
     often = np.repeat(np.arange(motions.size), motions)
     return replace(
         data,
-        **{
-            key: np.repeat(getattr(data, key), runs)
-            for key in ("run_direction", "speed", "torque", "acceleration", "run_stderr")
-        },
-        **{
-            key: np.repeat(getattr(data, key), starts)
-            for key in ("start_direction", "start_torque", "start_stderr")
-        },
+        run_direction=np.repeat(data.run_direction, runs),
+        speed=np.repeat(data.speed, runs),
+        torque=np.repeat(data.torque, runs),
+        acceleration=np.repeat(data.acceleration, runs),
+        run_stderr=np.repeat(data.run_stderr, runs),
+        start_direction=np.repeat(data.start_direction, starts),
+        start_torque=np.repeat(data.start_torque, starts),
+        start_stderr=np.repeat(data.start_stderr, starts),
         momenta=tuple(data.momenta[k] for k in often),
         whitening=tuple(data.whitening[k] for k in often),
     )

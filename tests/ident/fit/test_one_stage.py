@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from ident.advice import advise
 from ident.estimate import CURVE_PARAMETERS
 from ident.evidence.gathering import Evidence, IdentificationError
 from ident.fit.assumptions import Assumptions
+from ident.fit.cross_check import bootstrap_table
 from ident.fit.one_stage import Explained, explain
 from ident.model.friction import StribeckCurve
 from tests.ident.test_coverage import ROBOT, synthetic_map
@@ -71,6 +73,31 @@ def test_one_law_stands_in_the_mean_with_its_offset() -> None:
     assert "E-OFFSET" not in {finding.code for finding in second.findings}
 
 
+def test_one_law_that_does_not_hold_both_ways_is_told() -> None:
+    evidence = synthetic_map(SPEEDS, 2e-3, np.random.default_rng(2))
+    asymmetric = _explained(evidence, laws="one")
+    assert any("Identify without --one-law" in finding.text for finding in asymmetric.findings)
+    back = ROBOT.friction.negative
+    mirrored = [
+        replace(
+            run,
+            torque=-float(ROBOT.friction.positive.total(-run.velocity))
+            + run.torque
+            + float(back.total(-run.velocity)),
+        )
+        if run.velocity < 0
+        else run
+        for run in evidence.runs
+    ]
+    more = ROBOT.friction.positive.static_torque - back.static_torque
+    starts = [
+        replace(s, line=replace(s.line, torque=s.line.torque - more)) if s.direction < 0 else s
+        for s in evidence.starts
+    ]
+    symmetric = _explained(replace(evidence, runs=tuple(mirrored), starts=tuple(starts)), laws="one")
+    assert "E-LACKOFFIT" not in _codes(symmetric)
+
+
 def test_one_law_of_one_direction_has_no_offset() -> None:
     evidence = synthetic_map(SPEEDS, 2e-3, np.random.default_rng(3))
     found = _explained(replace(evidence, runs=tuple(r for r in evidence.runs if r.velocity < 0)), laws="one")
@@ -116,3 +143,26 @@ def test_every_parameter_has_a_profile_around_its_value() -> None:
             assert estimate.value is not None
             assert low is None or low < estimate.value
             assert high is None or high > estimate.value
+
+
+def test_the_bootstrap_stands_beside_the_profiles() -> None:
+    found = _explained(synthetic_map(SPEEDS, 2e-3, np.random.default_rng(8)))
+    table = bootstrap_table(found.weighted.data, found.values, np.random.default_rng(1))
+    (line,) = [line for line in table.splitlines() if "positive.coulomb_torque" in line]
+    _, value, low, _, high, drawn_low, _, drawn_high = line.split()
+    estimate = found.values.curves["positive"]["coulomb_torque"]
+    assert float(value) == pytest.approx(estimate.value, rel=1e-4)
+    assert (float(low), float(high)) == pytest.approx(estimate.interval95, rel=1e-4)
+    assert float(low) < float(drawn_high)
+    assert float(drawn_low) < float(high)
+    assert "stribeck_torque" not in table
+
+
+@pytest.mark.parametrize("laws", ["one", "each"])
+def test_advice_is_given_whatever_the_layout(laws: str) -> None:
+    evidence = synthetic_map(SPEEDS[6:], 2e-3, np.random.default_rng(9))
+    runs = evidence.runs if laws == "one" else tuple(run for run in evidence.runs if run.velocity > 0)
+    found = _explained(replace(evidence, runs=runs), laws=laws)
+    advice = advise(found.evidence, found.weighted)
+    assert {one.direction for one in advice} == set(found.weighted.data.model.directions)
+    assert all(one.runs for one in advice if one.quantity == "static_torque")

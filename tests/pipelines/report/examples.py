@@ -121,6 +121,16 @@ def robot(log: str = "velocity/p0.10.csv") -> dict[str, Any]:
         "inertia": estimate(published.INERTIA, "kg m^2"), **document,
         "torque_offset": {"value": None, "unit": "N m", "withheld": "not separable"},
         "inertia_sources": {"frequency_response": estimate(0.026, "kg m^2")},
+        "breakaways": [
+            {"direction": "positive", "used": 6, "censored": 1, "torque": [0.57, 0.58], "spread": 0.004,
+             "ramp_rates": [0.05, 0.2], "places": [-1.0, 2.0]},
+            {"direction": "negative", "used": 0, "censored": 0, "torque": None, "spread": None,
+             "ramp_rates": None, "places": None},
+        ],
+        "validation": {"held_out": held_out(log), "ramps": [
+            {"log": log, "direction": 1, "onset_time": 3.2, "onset_error": -0.02, "travel": 1.5,
+             "position_rms": 0.003, "counts_rms": 125.0},
+        ]},
         "runs": [
             {"log": log, "sha256": "ab" * 32, "protocol": "constant_velocity", "used": True, "why": None},
             {"log": "slow.csv", "sha256": "cd" * 32, "protocol": "constant_velocity", "used": False,
@@ -131,6 +141,20 @@ def robot(log: str = "velocity/p0.10.csv") -> dict[str, Any]:
             {"code": "E-STICKSLIP", "severity": "withhold", "text": "left out", "log": log},
         ],
     }  # fmt: skip
+
+
+def held_out(log: str = "velocity/p0.10.csv") -> dict[str, Any]:
+    """A breakaway and two speeds in each direction, one of them far from its prediction."""
+    points = [
+        {"log": log, "protocol": "constant_velocity" if speed else "breakaway", "direction": sign,
+         "velocity": sign * speed, "place": 0.3 * sign, "measured": sign * 0.5, "predicted": sign * 0.49,
+         "stderr": 0.01, "standardised": 4.2 if sign * speed == 1.5 else 1.0}
+        for sign in (1, -1)
+        for speed in (0.0, 0.05, 1.5)
+    ]  # fmt: skip
+    tests = [{"name": "trend with place", "statistic": 0.2, "expected": 0.0, "chance": 0.6, "data": 6}]
+    return {"predicted": 6, "folds": 3, "torque_rms": 0.01, "standardised_rms": 1.9, "inside95": 5,
+            "within": 2.1, "tests": tests, "points": points}  # fmt: skip
 
 
 def truth() -> dict[str, Any]:

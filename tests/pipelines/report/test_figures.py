@@ -16,6 +16,7 @@ from pipelines.report.friction_figures import figure2
 from pipelines.report.onset_panel import start_label
 from pipelines.report.style import svg_text
 from pipelines.report.time_figures import figure6, figure7
+from pipelines.report.validation_figure import validation_figure
 from tests.pipelines.report import examples
 
 
@@ -217,3 +218,21 @@ class TestFigure10:
 def test_a_start_is_named_by_its_position() -> None:
     assert start_label([0.6, 0.0, 0.0]) == start_label(0.6) == "+0.6"
     assert start_label("a\x1bb") == "a\\x1bb"
+
+
+class TestValidation:
+    def test_holds_every_held_out_run_over_speed_and_over_place(self) -> None:
+        held_out = examples.held_out()
+        over_speed, over_place = validation_figure(held_out).axes
+        for axes, variable in ((over_speed, "velocity"), (over_place, "place")):
+            drawn = sorted(tuple(np.ravel(mark.get_xydata())) for kind in "oD" for mark in _marks(axes, kind))
+            across = abs if variable == "velocity" else float
+            wanted = sorted((across(p[variable]), p["standardised"]) for p in held_out["points"])
+            assert drawn == wanted
+            assert axes.get_ylim()[1] > 4.2
+        assert len(_marks(over_speed, "D")) == 2
+
+    def test_is_drawn_without_a_run_that_moves(self) -> None:
+        held_out = examples.held_out()
+        still = [point for point in held_out["points"] if not point["velocity"]]
+        assert len(validation_figure({**held_out, "points": still}).axes) == 2

@@ -1,0 +1,138 @@
+"""What heads fit_report.txt: the outcome in words and numbers, for somebody at the rig.
+
+Values with their intervals, what is withheld and why, what the values rest on, how well they predict runs
+that the fit had not seen, and what was noticed. lmfit's own report follows whole. All is read off robot.json.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
+
+from data.names import shown
+from pipelines.report.axis_units import AxisUnits, units_of
+from pipelines.report.numerals import shown_number
+from pipelines.report.tables import WORDS, Entry, table1_entries
+
+_WIDTH: Final = 100
+_LONGEST: Final = 1500
+_TITLES: Final = {"": "", "positive": "positive direction", "negative": "negative direction", "mean": "mean"}
+_GRAVEST_FIRST: Final = ("refuse", "withhold", "warn")
+
+
+def fit_report(robot: Mapping[str, Any], own: str) -> str:
+    """The whole file: a summary, then `own`, the report of the fit itself."""
+    units = units_of(robot.get("axis", "rotary"))
+    simulated = " (SIMULATED logs of a virtual rig)" if robot.get("simulated") else ""
+    entries = table1_entries(robot)
+    parts = [
+        _headed(f"Friction identification{simulated}", _values(entries)),
+        _headed("Withheld, and what would identify it", _withheld(entries)),
+        _headed("What the values rest on", _basis(robot, units)),
+        _headed("Prediction of runs that the fit had not seen", _validation(robot, units)),
+        _headed("Findings, the gravest first", _findings(robot.get("notes") or ())),
+        _headed("The fit's own report (lmfit)", own.rstrip().splitlines()),
+    ]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def _headed(title: str, lines: Sequence[str]) -> str:
+    return "\n".join([title, "=" * len(title), *lines]) if lines else ""
+
+
+def _values(entries: Iterable[Entry]) -> list[str]:
+    lines, last = ["Values with 95 % intervals; torques are magnitudes in the direction of motion."], "?"
+    for entry in sorted(entries, key=lambda entry: list(_TITLES).index(entry.direction)):
+        if entry.direction != last:
+            lines += ["", _TITLES[entry.direction]] if entry.direction else [""]
+            last = entry.direction
+        value = entry.shown_value if entry.value is not None else "withheld"
+        interval = entry.shown_interval if entry.fixed or entry.interval95 else ""
+        label = f"{entry.symbol:4} {WORDS[entry.parameter]}"
+        lines.append(f"  {label:24} {value:>11} {interval:26} {entry.unit}".rstrip())
+    return lines
+
+
+def _withheld(entries: Iterable[Entry]) -> list[str]:
+    reasons: dict[str, list[str]] = {}
+    for entry in entries:
+        if entry.value is None and entry.direction != "mean":
+            name = f"{entry.symbol} ({entry.direction})" if entry.direction else entry.symbol
+            reasons.setdefault(shown(entry.withheld or "", _LONGEST), []).append(name)
+    return [line for why, names in reasons.items() for line in _item(f"{', '.join(names)}: {why}")]
+
+
+def _basis(robot: Mapping[str, Any], units: AxisUnits) -> list[str]:
+    runs: Sequence[Mapping[str, Any]] = [
+        run for run in robot.get("runs") or () if run.get("protocol") != "set_point"
+    ]
+    lines = []
+    for protocol in dict.fromkeys(str(run["protocol"]) for run in runs):
+        own = [run for run in runs if run["protocol"] == protocol]
+        used = sum(bool(run["used"]) for run in own)
+        lines += _item(f"{protocol.replace('_', ' ')}: {used} of {len(own)} logs used")
+    for own in robot.get("breakaways") or ():
+        lines += _item(_breakaways(own, units))
+    for run in runs:
+        if not run["used"]:
+            lines += _item(f"left out: {shown(str(run['log']), 200)}: {shown(str(run['why']), _LONGEST)}")
+    return lines
+
+
+def _breakaways(own: Mapping[str, Any], units: AxisUnits) -> str:
+    text = f"F_s, {own['direction']} direction: {own['used']} breakaways"
+    if own["used"]:
+        slow, fast = (shown_number(rate) for rate in own["ramp_rates"])
+        near, far = (shown_number(place) for place in own["places"])
+        low, high = (shown_number(torque) for torque in own["torque"])
+        text += f" under ramps of {slow} to {fast} {units.torque}/s, at places from {near} to {far} "
+        text += f"{units.position}: {low} to {high} {units.torque}"
+        if own["spread"] is not None:
+            text += f", a spread of {shown_number(own['spread'])}"
+    if own["censored"]:
+        text += f"; {own['censored']} ramps ended at the torque limit and only bound it"
+    return text
+
+
+def _validation(robot: Mapping[str, Any], units: AxisUnits) -> list[str]:
+    validation: Mapping[str, Any] = robot.get("validation") or {}
+    held_out: Mapping[str, Any] = validation.get("held_out") or {}
+    if not held_out.get("predicted"):
+        return _item("too few runs to leave any out") if validation else []
+    lines = _item(
+        f"{held_out['predicted']} runs and breakaways, left out in {held_out['folds']} folds and predicted "
+        f"from the rest: {held_out['inside95']} lie in their 95 % prediction intervals; the error is "
+        f"{shown_number(held_out['torque_rms'])} {units.torque} rms, "
+        f"{shown_number(held_out['standardised_rms'])} of what was expected"
+    )
+    for test in held_out["tests"]:
+        lines += _item(
+            f"{test['name']}: {shown_number(test['statistic'])}, {shown_number(test['expected'])} expected; "
+            f"chance alone gives as much with p = {test['chance']:.2g}"
+        )
+    ramps: Sequence[Mapping[str, Any]] = validation.get("ramps") or ()
+    for motion in ramps:
+        lines += _item(
+            f"motion after breakaway, {shown(str(motion['log']), 200)} at "
+            f"{shown_number(motion['onset_time'])} s: starts {shown_number(abs(motion['onset_error']))} s "
+            f"{'later' if motion['onset_error'] > 0 else 'earlier'} than recorded; position within "
+            f"{shown_number(motion['position_rms'])} {units.position} rms "
+            f"({shown_number(motion['counts_rms'])} counts) over "
+            f"{shown_number(motion['travel'])} {units.position}"
+        )
+    return lines
+
+
+def _findings(notes: Iterable[Mapping[str, Any]]) -> list[str]:
+    order = {severity: rank for rank, severity in enumerate(_GRAVEST_FIRST)}
+    ranked = sorted(notes, key=lambda note: order.get(str(note["severity"]), len(order)))
+    return [
+        line
+        for note in ranked
+        for line in _item(f"{note['code']} ({note['severity']}): {shown(str(note['text']), _LONGEST)}")
+    ]
+
+
+def _item(text: str) -> list[str]:
+    return textwrap.wrap(text, _WIDTH, initial_indent="- ", subsequent_indent="  ", break_on_hyphens=False)
