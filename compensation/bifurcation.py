@@ -3,7 +3,8 @@
 For every value of the parameter the equilibrium sets come from their closed form (`rest_pieces`) and
 the limit cycles from the return map on v = 0 (`loop_cycles`). A branch of cycles ends where the return map
 jumps, and of a cycle without the loop's symmetry its mirror image is a branch of its own. The points at which
-branches begin, end and change are refined (`cycle_changes`).
+branches begin, end and change are refined (`cycle_changes`). Where no cycle was found because the motion is
+not resolved, a note says so.
 
 Amplitude is max|x1| over a period, everywhere.
 """
@@ -22,9 +23,11 @@ from compensation.controller import Gains
 from compensation.cycle_chains import Chain, chained
 from compensation.cycle_changes import changes_of_cycles, cut_at_jumps
 from compensation.loop_cycles import stable_cycles
-from compensation.loop_section import LoopSection, with_gain
+from compensation.loop_parameters import own_time
+from compensation.loop_section import PATIENCE, LoopSection, with_gain
+from compensation.loop_starts import start_sizes
 from compensation.loop_tables import Parameter
-from compensation.orbits.periodic_orbits import Cycle, find_cycle
+from compensation.orbits.periodic_orbits import DECAYS, VANISHED, Cycle, find_cycle
 from compensation.orbits.steady_state import SteadyState, classify
 from compensation.rest_pieces import (
     SET_POINT,
@@ -38,10 +41,12 @@ from ident.model.doors import expect
 from ident.model.friction import ModelError
 from ident.model.numbers import is_one_of, real_array, shown
 from ident.simulation.filippov_system import FloatArray
+from ident.simulation.integrate import END_REASONS, EQUILIBRIUM
 
 Kind = Literal["equilibrium_set", "equilibrium", "limit_cycle"]
 
 ONE_CHANGE: Final = 1e-9  # relative distance at which two changes are one
+SETTLED: Final = (END_REASONS[EQUILIBRIUM], DECAYS)  # on no cycle
 SAMPLES: Final = 4000  # of a trajectory that is classified by its samples
 
 
@@ -82,6 +87,7 @@ class Diagram:
     gains: Gains  # the others are as here
     branches: tuple[Branch, ...]
     bifurcations: tuple[Bifurcation, ...]
+    notes: tuple[str, ...] = ()  # what could not be resolved
 
 
 def diagram(loop: ClosedLoop, parameter: Parameter, values: ArrayLike) -> Diagram:
@@ -118,7 +124,42 @@ def diagram(loop: ClosedLoop, parameter: Parameter, values: ArrayLike) -> Diagra
         gains=loop.controller.gains,
         branches=(*_equilibrium_branches(grid, pieces), *cycles),
         bifurcations=tuple(sorted(bifurcations, key=lambda item: item.value)),
+        notes=tuple(_unresolved(loop, parameter, grid, chains)),
     )
+
+
+def _unresolved(
+    loop: ClosedLoop, parameter: Parameter, grid: FloatArray, chains: Sequence[Chain]
+) -> Iterator[str]:
+    """What is said of ranges without a cycle whose motion neither repeats, nor rests, nor decays.
+
+    Both ends of a range and its middle are looked at.
+    """
+    without = np.ones(grid.size, bool)
+    for chain in chains:
+        without[chain.first : chain.last + 1] = False
+    there = np.flatnonzero(without)
+    starts = start_sizes(loop, parameter, grid)
+    for run in np.split(there, np.flatnonzero(np.diff(there) > 1) + 1):
+        for index in np.unique(run[[0, run.size // 2, -1]]).tolist() if run.size else ():
+            value = float(grid[index])
+            why = _does_not_settle(with_gain(loop, parameter, value), float(starts[index, 0]))
+            if why is not None:
+                yield (
+                    f"no limit cycle is drawn from {parameter} = {grid[run[0]]:.6g} to {grid[run[-1]]:.6g}, "
+                    f"but there may be one: at {value:.6g} the motion is not resolved ({why})"
+                )
+                break
+
+
+def _does_not_settle(loop: ClosedLoop, x1: float) -> str | None:
+    """Why the motion from x1 [rad] is seen neither to repeat, nor to rest, nor to decay; None where it is."""
+    found = find_cycle(LoopSection(loop), np.array([x1, 0.0]))
+    if isinstance(found, Cycle) or found.end_reason in SETTLED:
+        return None
+    run = simulate(loop, (x1, 0.0, 0.0), duration=PATIENCE * own_time(loop.modes), times=())
+    decayed = run.end_reason == "time reached" and abs(run.end_state[0]) <= VANISHED * abs(x1)
+    return None if decayed or run.end_reason == "equilibrium" else found.end_reason
 
 
 def where_it_ends(loop: ClosedLoop, start: ArrayLike, *, duration: float) -> SteadyState:

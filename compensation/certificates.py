@@ -4,11 +4,12 @@ Two laws meet in the loop: the robot's and the compensator's. Each statement bel
 compensator carries, the hypothesis, and by how much it holds or fails. The statements are:
 
 * *contraction*: L > L_c(worst) of the robot, and L > 0, which the theorem asks of the observer even where
-  damping alone would do (L_c < 0). For given x2(t) any two observer errors approach each other, eq
-  (17). It says that errors forget their start, not that they vanish, and needs nothing of the compensator's
-  law.
+  damping alone would do (L_c < 0). For given x2(t) (and x1(t), where J^ is not J) any two observer errors
+  approach each other, eq (17). It says that errors forget their start, not that they vanish, and needs
+  nothing of the compensator's law.
 * *(a)* the error goes to zero for every x2(t): contraction, and e = 0 is a solution, which takes each
-  direction's own law with r = 1 (a model of the robot that is exact, b and J included).
+  direction's own law with r = 1 (a model of the robot that is exact, b and J included; without a Stribeck
+  effect v_s and beta say nothing).
 * *(b)* the loop without error is exponentially stable, A_II being Hurwitz (n1 > 0, b^ + n2 > 0).
 * *(c)* S_II is input-to-state stable: a linear Hurwitz system is; with a damping for each direction it is
   homogeneous of degree one, for which exponential stability implies it too.
@@ -27,7 +28,7 @@ infinite.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Final
 
 import numpy as np
@@ -66,7 +67,7 @@ def certificates(robot: OneLinkRobot, controller: Controller, *, law: str) -> tu
         law=law,
         hypothesis="theorem: (a), (b) and (c)",
         holds=error.holds and hurwitz.holds and stable_input.holds,
-        margin=error.margin,
+        margin=None if error.margin is None or hurwitz.margin is None else min(error.margin, hurwitz.margin),
         unit="1/s",
         says="the set point is globally exponentially stable"
         if error.holds and hurwitz.holds
@@ -116,14 +117,14 @@ def _margin(gain: float, critical: float) -> float:
 
 
 def _exactness(robot: OneLinkRobot, controller: Controller, law: str) -> tuple[Certificate, Certificate]:
-    same = controller.model == robot
+    same = _without_idle(controller.model) == _without_idle(robot)
     gap = 0.0 if same else law_gap(robot.friction, controller.model.friction)
     r = controller.gains.compensation
     own = Certificate(
         law=law,
         hypothesis="the compensator carries the robot's own law in each direction",
         holds=same,
-        margin=0.0 - gap,
+        margin=0.0 - gap if same or gap > 0.0 else None,
         unit="N m",
         says="e = 0 is a solution if r = 1, as far as the fitted law is the robot's"
         if same
@@ -139,6 +140,16 @@ def _exactness(robot: OneLinkRobot, controller: Controller, law: str) -> tuple[C
         says="the law is compensated in full" if r == 1.0 else f"r = {r}: e = 0 is no solution",
     )
     return own, unity
+
+
+def _without_idle(robot: OneLinkRobot) -> OneLinkRobot:
+    """The same robot, with one v_s and beta for all curves that have no Stribeck effect."""
+    curves = (curve_of(robot.friction, direction) for direction in DIRECTIONS)
+    settled = (
+        curve if curve.stribeck_torque > 0.0 else replace(curve, stribeck_velocity=1.0, stribeck_shape=1.0)
+        for curve in curves
+    )
+    return replace(robot, friction=StribeckFriction(*settled))
 
 
 def _differing(robot: OneLinkRobot, model: OneLinkRobot) -> str:

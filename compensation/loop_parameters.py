@@ -24,8 +24,7 @@ SLOWEST: Final = 1e-12  # [1/s] stands for an observer without gain or damping, 
 def own_time(parameters: FloatArray) -> float:
     """The slowest time scale [s] of the loop with these parameters (6, 16), by which its motion is awaited.
 
-    Of robot and model: sqrt(J/n1), in which the link swings, and (b + n2)/n1, in which it creeps home; and
-    that of the estimate at rest, 1/(L + (b^ + n2)/J^).
+    Of robot and model: sqrt(J/n1), in which the link swings, and (b + n2)/n1, in which it creeps home.
     """
     slowest = 0.0
     for mode in range(SLIP_MODES):
@@ -33,7 +32,7 @@ def own_time(parameters: FloatArray) -> float:
         model, true = -k[C1], -k[C1] - k[A1]
         swing = max(1.0 / sqrt(model), 1.0 / sqrt(true))
         slowest = max(slowest, swing, -k[C2] / model, (-k[C2] - k[A2]) / true)
-    return float(max(slowest, 1.0 / parameters[SLIP_MODES, RATE], 1.0 / parameters[SLIP_MODES + 1, RATE]))
+    return float(slowest)
 
 
 @compiled

@@ -33,7 +33,8 @@ from ident.simulation.taylor import ORDER, TAYLOR
 EVENT_STORE: Final = 256  # of a half turn: chattering beyond that is reported as no return
 STEP_LIMIT: Final = 5_000  # of a turn, which takes a few hundred
 STEPS_PER_DECAY: Final = 0.15  # where the observer is fast: a step spans some nine decay times of its error
-MOST_STEPS: Final = 1_000_000
+LONG_TURN: Final = 40.0  # times of the loop's own, that a turn may take at so small steps
+MOST_STEPS: Final = 500_000  # beyond: a turn at L = 1e6 of the paper's robot takes half of them
 MOST_HALTS: Final = 1000  # in a turn: a link that halts more often is chattering, not turning
 
 CARRY: Final = types.void(
@@ -108,9 +109,9 @@ def _map_addresses() -> tuple[int, int]:
 
 
 @compiled
-def steps_allowed(parameters: FloatArray, longest: float) -> int:
-    """Steps of a turn whose half turns may last as long as `longest` [s]: more where the observer is fast."""
-    needed = STEPS_PER_DECAY * longest * fastest_decay(parameters)
+def steps_allowed(parameters: FloatArray) -> int:
+    """Steps of a turn: more where the observer is fast."""
+    needed = STEPS_PER_DECAY * LONG_TURN * own_time(parameters) * fastest_decay(parameters)
     return STEP_LIMIT + int(min(needed, float(MOST_STEPS)))
 
 
@@ -131,7 +132,7 @@ def returns(
     for one half turn, in times of the loop's own (`own_time`), `run` the address of a kernel of `loop_runs`.
     """
     longest = patience * own_time(parameters)
-    limit = steps_allowed(parameters, longest)
+    limit = steps_allowed(parameters)
     state = np.empty(STATES)
     assign(state, start)
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
@@ -189,7 +190,7 @@ def derivative(
     the addresses of the kernels that integrate and that carry deviations.
     """
     longest = patience * own_time(parameters)
-    limit = steps_allowed(parameters, longest)
+    limit = steps_allowed(parameters)
     signs, contact = np.empty(2, np.int64), np.empty(2, np.int64)
     begin(parameters, state, signs, contact)
     y = np.zeros(STATES * (1 + DEVIATIONS))

@@ -32,7 +32,7 @@ from data.protocols import ProtocolName
 from data.recording import Axis, Recording
 from data.resolution import lattice_spacing
 from data.screening import Signals as Run
-from data.screening import require_samples, screen
+from data.screening import require_count, require_samples, screen
 from data.signals import Clock, RigSignals, Signal, Signals, log_format
 from data.units import Quantity, known_unit, same_unit, si_word
 
@@ -136,26 +136,51 @@ def read_recording(
     )
     if window is not None:
         run = _cut(run, window)
+    recording = screened_recording(
+        run, clock=logged.clock, axis=axis, encoder_counts=encoder_counts, torque_limit=torque_limit
+    )
+    return replace(
+        recording,
+        begun=logged.begun,
+        simulated=logged.metadata.get("simulated", "").strip().lower() == "true",
+        sha256=hashlib.sha256(content.data).hexdigest(),
+        metadata=logged.metadata,
+        findings=(*logged.findings, *recording.findings),
+    )
+
+
+def screened_recording(
+    run: Run,
+    *,
+    clock: str,
+    axis: Axis = "rotary",
+    encoder_counts: float | None = None,
+    torque_limit: float | None = None,
+) -> Recording:
+    """A run in SI as a recording, screened; `clock` says what its time is. Parameters as `read_recording`.
+
+    Raises
+    ------
+    LogError
+        When the screening refuses the run.
+    """
     require_samples(run)
-    resolution = _resolution(run.position, axis=axis, encoder_counts=encoder_counts)
-    screened = screen(run, clock=logged.clock, resolution=resolution, torque_limit=torque_limit)
+    resolution = _resolution(run, axis=axis, encoder_counts=encoder_counts)
+    screened = screen(run, clock=clock, resolution=resolution, torque_limit=torque_limit)
     kept = screened.signals
     return Recording(
-        log=log,
-        protocol=protocol,
+        log=run.log,
+        protocol=run.protocol,
         time=kept.time,
         position=kept.position,
         torque=kept.torque,
         velocity=kept.velocity,
         reference=kept.reference,
         resolution=resolution,
-        torque_limit=torque_limit,
+        torque_limit=screened.torque_limit,
         axis=axis,
-        begun=logged.begun,
-        simulated=logged.metadata.get("simulated", "").strip().lower() == "true",
-        sha256=hashlib.sha256(content.data).hexdigest(),
-        metadata=logged.metadata,
-        findings=(*logged.findings, *screened.findings),
+        findings=screened.findings,
+        breaks=kept.breaks,
     )
 
 
@@ -185,10 +210,15 @@ def read_bytes(path: Path, *, log: str) -> ByteArray:
     return np.frombuffer(mapped, np.uint8)
 
 
-def _resolution(position: FloatArray, *, axis: Axis, encoder_counts: float | None) -> float | None:
-    if encoder_counts is not None:
-        return (_TURN if axis == "rotary" else 1.0) / encoder_counts
-    return lattice_spacing(position[np.isfinite(position)])
+def _resolution(run: Run, *, axis: Axis, encoder_counts: float | None) -> float | None:
+    """One encoder count [rad], declared or found; raises LogError where the positions belie the declared."""
+    found = lattice_spacing(run.position[np.isfinite(run.position)])
+    if encoder_counts is None:
+        return found
+    declared = (_TURN if axis == "rotary" else 1.0) / encoder_counts
+    if found is not None:
+        require_count(run, found=found, declared=declared)
+    return declared
 
 
 def _cut(run: Run, window: tuple[float, float]) -> Run:

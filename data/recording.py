@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from types import MappingProxyType
 from typing import Literal
 
@@ -40,6 +41,7 @@ class Recording:
     sha256: str = ""
     metadata: Mapping[str, str] = field(default_factory=lambda: _NOTHING)
     findings: tuple[Finding, ...] = ()  # what the reader and the screening saw
+    breaks: tuple[int, ...] = ()  # samples at which another part begins: how long it took is not known
 
     def __post_init__(self) -> None:
         n = self.time.size
@@ -68,6 +70,23 @@ class Recording:
                 f"{self.log}: the clock does not advance at sample {where + 1}: "
                 f"{self.time[where]:.9g} s, then {self.time[where + 1]:.9g} s (E-CLOCK)"
             )
+
+    def parts(self) -> tuple[Recording, ...]:
+        """The run taken apart at its breaks: itself where it has none."""
+        if not self.breaks:
+            return (self,)
+        return tuple(
+            replace(
+                self,
+                time=self.time[first:past],
+                position=self.position[first:past],
+                torque=self.torque[first:past],
+                velocity=None if self.velocity is None else self.velocity[first:past],
+                reference=None if self.reference is None else self.reference[first:past],
+                breaks=(),
+            )
+            for first, past in pairwise((0, *self.breaks, self.time.size))
+        )
 
     @property
     def sample_period(self) -> float:

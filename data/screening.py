@@ -4,7 +4,9 @@ Each detector here sees one run in SI and answers with findings, with mended sig
 (`LogError`) that names the sample, the time, the parameter harmed and the remedy. Nothing that could be good
 data is altered: only a wrap whose other side fits, and single samples that leave the path and come back.
 
-    E-CLOCK  time does not advance, or leaps years     refused
+    E-CLOCK  time does not advance                    late samples sorted in, wrong stamps left out, the run
+                                                      taken apart where the clock was set back; refused where
+                                                      too little is left, or time leaps years
     E-WRAP   the encoder wraps                        unwrapped where unambiguous, else refused
     E-SPIKE  single wrong positions                   dropped and counted; refused above 1 %
     E-GAP    lost samples, jitter                     warned; no derivative is taken across a gap
@@ -22,12 +24,28 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from data.clocks import Advancing, advancing
 from data.findings import Finding, LogError, Severity
 from data.protocols import IDENTIFIES, ProtocolName
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+IndexArray = NDArray[np.intp]
+# Protocols of which each part of a split run says something by itself.
+TAKEN_APART: Final = frozenset({"breakaway", "constant_velocity", "excitation"})
 FEWEST_SAMPLES: Final = 10
+AT_LIMIT: Final = 0.999  # of a declared torque limit
+FLAT_SAMPLES: Final = 5  # at the largest torque
+BANDS: Final = (
+    0.005,
+    0.2,
+    12,
+)  # least and most of a torque's range that noise may cover, and how many are tried
+FLAT_SHARE: Final = 0.03  # of a run; a tenth of it where exactly one number comes back
+LEVELS: Final = 10  # other sizes that a torque takes, or it is a square wave
+PILED_UP: Final = 4.0  # times as often at the largest torque as right below it
+SIGN_BLOCKS: Final = 8  # of a run, by whose scatter its mean work is judged
+FAR_BEYOND: Final = 3.0  # times the torque limit
 GAP: Final = 3.0  # median steps
 _YEARS: Final = 1e8  # [s] between two samples of no run
 _SPIKE_WINDOW: Final = 25  # samples on either side for the local spread
@@ -40,6 +58,12 @@ _LOOKS_LIKE: Final = (
     (2.0 * math.pi, "the position looks like revolutions", "rev"),
     (1e-3, "the position looks like thousandths (mrad or mm)", "mrad"),
     (6.0, "the position looks like degrees and the velocity like rpm, or the other way round", "deg/s"),
+)
+_COUNT_LOOKS_LIKE: Final = (
+    (180.0 / math.pi, "it looks like degrees"),
+    (0.5 / math.pi, "it looks like revolutions"),
+    (1000.0, "it looks like thousandths (mrad or mm)"),
+    (1e-3, "it looks like thousands"),
 )
 
 
@@ -54,6 +78,7 @@ class Signals:
     torque: FloatArray  # [N m]
     velocity: FloatArray | None  # [rad/s]
     reference: FloatArray | None  # [rad]
+    breaks: tuple[int, ...] = ()  # samples at which another part of the run begins: nothing joins them
 
     def named(self) -> dict[str, FloatArray]:
         """The signals that are there, by name."""
@@ -67,6 +92,12 @@ class Signals:
 
     def keep(self, samples: BoolArray) -> Signals:
         """The same run with some samples only."""
+        before = np.concatenate(([0], np.cumsum(samples)))
+        breaks = tuple(int(before[k]) for k in self.breaks)
+        return replace(self.taken(np.flatnonzero(samples)), breaks=breaks)
+
+    def taken(self, samples: IndexArray) -> Signals:
+        """Samples by number, in their order, as one part."""
         return replace(
             self,
             time=self.time[samples],
@@ -74,6 +105,7 @@ class Signals:
             torque=self.torque[samples],
             velocity=None if self.velocity is None else self.velocity[samples],
             reference=None if self.reference is None else self.reference[samples],
+            breaks=(),
         )
 
 
@@ -83,6 +115,7 @@ class Screened:
 
     signals: Signals
     findings: tuple[Finding, ...]
+    torque_limit: float | None  # as declared, or where the torque is flat [N m]
 
 
 def screen(run: Signals, *, clock: str, resolution: float | None, torque_limit: float | None) -> Screened:
@@ -106,12 +139,15 @@ def screen(run: Signals, *, clock: str, resolution: float | None, torque_limit: 
     """
     require_finite(run)
     require_samples(run)
-    require_advancing(run, clock)
+    run, clocks = advance(run, clock)
     run, wraps = unwrap(run, resolution)
     run, spikes = drop_spikes(run, resolution)
     require_velocity_unit(run, resolution)
+    require_torque_size(run, torque_limit)
     require_torque_sign(run, resolution)
-    return Screened(run, (*wraps, *spikes, *gaps(run, clock), *saturation(run, torque_limit)))
+    limit = flat_top(run) if torque_limit is None else torque_limit
+    saturated = saturation(run, limit, declared=torque_limit is not None)
+    return Screened(run, (*clocks, *wraps, *spikes, *gaps(run, clock), *saturated), limit)
 
 
 def require_finite(run: Signals) -> None:
@@ -138,22 +174,50 @@ def require_samples(run: Signals) -> None:
         )
 
 
-def require_advancing(run: Signals, clock: str) -> None:
-    """E-CLOCK: refuse a clock that stands still, jumps back, or jumps ahead by years."""
-    step = np.diff(run.time)
-    bad = np.flatnonzero(step <= 0.0)
-    if not bad.size:
-        _require_one_epoch(run, step, clock)
-        return
-    k = int(bad[0])
-    back = run.time[k] - run.time[k + 1]
-    what = "stands still" if back == 0.0 else f"jumps back by {back:.6g} s"
-    raise LogError(
-        f"{run.log}: E-CLOCK refuse: the clock ({clock}) {what} at sample {k + 1}, t = {run.time[k]:.6f} s"
-        + (f", and at {bad.size - 1} more places" if bad.size > 1 else "")
-        + "; every speed there, and so the friction map, would be wrong. Choose another `clock` or time "
-        "signal, or keep one side with `window`"
+def advance(run: Signals, clock: str) -> tuple[Signals, tuple[Finding, ...]]:
+    """E-CLOCK: a run whose clock stands still, jumps back or is out of order, put right or taken apart."""
+    found = advancing(run.time, fewest=FEWEST_SAMPLES)
+    if found.first is None:
+        _require_one_epoch(run, np.diff(run.time), clock)
+        return run, ()
+    k, step = found.first
+    back = f"jumps back by {-step:.6g} s" if step < -1e-12 else "stands still"
+    places = int(np.count_nonzero(np.diff(run.time) <= 0.0))
+    seen = f"the clock ({clock}) {back} at sample {k}, t = {run.time[k - 1]:.6f} s" + (
+        f", and at {places - 1} more places" if places > 1 else ""
     )
+    if not found.kept.size:
+        raise LogError(
+            f"{run.log}: E-CLOCK refuse: {seen}; no part of the run in which it advances has "
+            f"{FEWEST_SAMPLES} samples, so that no speed can be told, and nothing of "
+            f"{IDENTIFIES[run.protocol]}. Choose another `clock` or time signal, or record it again"
+        )
+    mended = replace(run.taken(found.kept), time=found.time, breaks=found.breaks)
+    done = [*_said(found)]
+    if found.breaks and run.protocol not in TAKEN_APART:
+        edges = np.array([0, *found.breaks, found.kept.size])
+        longest = int(np.argmax(np.diff(edges)))
+        mended = mended.taken(np.arange(edges[longest], edges[longest + 1]))
+        done.append(f"of its parts only the longest is used, from t = {mended.time[0]:.6g} s")
+    _require_one_epoch(mended, np.diff(mended.time), clock)
+    return mended, (_warn("E-CLOCK", f"{seen}; {'; '.join(done)}", run),)
+
+
+def _said(found: Advancing) -> list[str]:
+    """What was done about a clock that does not advance."""
+    done = []
+    if found.late:
+        done.append(f"{found.late} samples that came late were sorted in by their stamps")
+    if found.wrong:
+        done.append(f"{found.wrong} samples with a wrong stamp between two right ones were left out")
+    if found.breaks:
+        done.append(
+            f"the run was split into {len(found.breaks) + 1} parts: how long the motion between them took is "
+            "not known, no speed is taken across, and the time is counted on from part to part"
+        )
+    if found.short:
+        done.append(f"{found.short} samples in parts of under {FEWEST_SAMPLES} were left out")
+    return done
 
 
 def _require_one_epoch(run: Signals, step: FloatArray, clock: str) -> None:
@@ -218,7 +282,7 @@ def drop_spikes(run: Signals, resolution: float | None) -> tuple[Signals, tuple[
     q = run.position
     off = q[1:-1] - 0.5 * (q[:-2] + q[2:])
     distance = np.abs(off)
-    floor = 6.0 * (resolution or 0.0) + 1e-9 * float(np.ptp(q))
+    floor = 6.0 * (resolution or _smallest_step(q)) + 1e-9 * float(np.ptp(q))
     beside = np.stack((np.roll(off, 1), np.roll(off, -1)))
     alone = np.all(np.abs(beside + 0.5 * off) < 0.2 * distance, axis=0)
     suspects = np.flatnonzero(alone & (distance > floor) & (distance > 8.0 * float(np.median(distance))))
@@ -246,10 +310,18 @@ def drop_spikes(run: Signals, resolution: float | None) -> tuple[Signals, tuple[
     return run.keep(keep), (_warn("E-SPIKE", f"{seen}; they were dropped", run),)
 
 
+def _smallest_step(position: FloatArray) -> float:
+    """The smallest step of positions (n,) [rad]: a count, where they have too few values to show one."""
+    steps = np.abs(np.diff(position))
+    steps = steps[steps > 1e-12 * float(np.max(np.abs(position), initial=0.0))]
+    return float(steps.min()) if steps.size else 0.0
+
+
 def gaps(run: Signals, clock: str) -> tuple[Finding, ...]:
     """E-GAP: steps of over three medians."""
     step = np.diff(run.time)
     median = float(np.median(step))
+    step[np.array(run.breaks, np.intp) - 1] = median
     wide = np.flatnonzero(step > GAP * median)
     if not wide.size:
         return ()
@@ -261,24 +333,15 @@ def gaps(run: Signals, clock: str) -> tuple[Finding, ...]:
     return (_warn("E-GAP", text, run),)
 
 
-def saturation(run: Signals, torque_limit: float | None) -> tuple[Finding, ...]:
-    """E-SAT: torque at its limit, or a flat top at its largest value."""
+def saturation(run: Signals, limit: float | None, *, declared: bool) -> tuple[Finding, ...]:
+    """E-SAT: torque at its limit [N m], as declared or as `flat_top` found it."""
+    if limit is None:
+        return ()
     size = np.abs(run.torque)
-    top = float(size.max())
-    if torque_limit is not None:
-        at_limit = size >= 0.999 * torque_limit
-        if not at_limit.any():
-            return ()
-        what = f"at the limit of {torque_limit:g}"
-    else:
-        at_limit = size == top
-        starts = np.count_nonzero(np.diff(at_limit.astype(np.int8), prepend=0) == 1)
-        flat = int(np.count_nonzero(at_limit))
-        long_enough = flat >= 3 * starts and flat >= 0.01 * size.size
-        distinct = np.unique(run.torque[~at_limit]).size
-        if top == 0.0 or starts < 3 or not long_enough or distinct < 0.5 * (size.size - flat):
-            return ()
-        what = f"flat at its largest value, {top:.6g}"
+    at_limit = size >= AT_LIMIT * limit if declared else size >= (1.0 - 1e-12) * limit
+    if not at_limit.any():
+        return ()
+    what = f"at the limit of {limit:g}" if declared else f"flat at its top, about {limit:.6g}"
     k = int(np.argmax(at_limit))
     text = (
         f"the torque is {what} in {np.count_nonzero(at_limit)} of {size.size} samples, first at "
@@ -286,6 +349,69 @@ def saturation(run: Signals, torque_limit: float | None) -> tuple[Finding, ...]:
         "only a lower bound of F_s. Those samples are not to be used"
     )
     return (_warn("E-SAT", text, run),)
+
+
+def flat_top(run: Signals) -> float | None:
+    """The torque [N m] at which an actuator without a declared limit saturates; None where it does not.
+
+    A torque that is cut off piles up at its largest size: at exactly one number where the log is cut off, in
+    a band as wide as the noise where the actuator is. It gets there gradually; a square wave jumps. The top
+    of a smooth wave is at most 2.4 times as wide as what lies right below it, and noise is rarest at its
+    largest. A constant speed is meant to show a plateau, and a loop at rest to hold its torque: there only a
+    number that comes back again and again tells, or nothing.
+    """
+    size = np.abs(run.torque)
+    top, reach = float(size.max()), float(np.ptp(size))
+    if run.protocol == "set_point" or top == 0.0:
+        return None
+    others = size[size < top]
+    levels = np.unique(others).size
+    fine = levels > 0.5 * others.size
+    steady = run.protocol == "constant_velocity"
+    if levels < LEVELS or (steady and not fine):
+        return None
+    bands = [] if steady else list(np.geomspace(*BANDS) * reach)
+    for width in [0.0] * fine + bands:
+        flat = size >= top - width
+        often = int(np.count_nonzero(flat))
+        below = int(np.count_nonzero(size >= top - 2.0 * width)) - often
+        begins = np.flatnonzero(np.diff(flat.astype(np.int8)) == 1)
+        share = FLAT_SHARE if width else FLAT_SHARE / 10.0
+        if often < max(FLAT_SAMPLES, share * size.size, PILED_UP * below):
+            continue
+        if begins.size < (FLAT_SAMPLES if steady else 1):
+            continue
+        if float(np.median(top - size[begins])) <= 0.1 * reach + width:
+            return float(np.median(size[flat]))
+    return None
+
+
+def require_torque_size(run: Signals, torque_limit: float | None) -> None:
+    """E-UNIT: refuse a torque that is far beyond what the actuator can give."""
+    if torque_limit is None:
+        return
+    size = float(np.percentile(np.abs(run.torque), 99.0))
+    if size <= FAR_BEYOND * torque_limit:
+        return
+    raise LogError(
+        f"{run.log}: E-UNIT refuse: the torque reaches {size:.4g}, {size / torque_limit:.4g} times the "
+        f"torque limit of {torque_limit:g} that [rig] declares: it looks like mN m, or a current without its "
+        "torque constant; every torque and the inertia would be off by such a factor. Correct `unit` or "
+        "`scale` of the torque in [signals], or the limit"
+    )
+
+
+def require_count(run: Signals, *, found: float, declared: float) -> None:
+    """E-UNIT: refuse positions whose smallest step is the declared count [rad] in another unit."""
+    factor = found / declared
+    looks = next((text for size, text in _COUNT_LOOKS_LIKE if abs(factor / size - 1.0) < 0.01), None)
+    if looks is None:
+        return
+    raise LogError(
+        f"{run.log}: E-UNIT refuse: the position moves in steps of {found:.6g}, {factor:#.4g} times the "
+        f"count of {declared:.6g} that `encoder_counts` declares: {looks}; the inertia, b and v_s would be "
+        "off by such a factor. Correct `unit` of the position in [signals], or `encoder_counts`"
+    )
 
 
 def require_velocity_unit(run: Signals, resolution: float | None) -> None:
@@ -318,14 +444,21 @@ def require_velocity_unit(run: Signals, resolution: float | None) -> None:
 
 
 def require_torque_sign(run: Signals, resolution: float | None) -> None:
-    """E-SIGN: refuse a torque that takes work out of the link over the whole run, which friction forbids."""
+    """E-SIGN: refuse a torque that takes work out of the link over the whole run, which friction forbids.
+
+    What inertia takes it gives back; where it is large, and the link moves one way, the mean work tells.
+    """
     way = np.diff(run.position)
-    if float(np.sum(np.abs(way))) < 200.0 * (resolution or 0.0) + 1e-12:
+    far = float(np.sum(np.abs(way)))
+    if far < 200.0 * (resolution or 0.0) + 1e-12:
         return
     power = run.torque[:-1] * way  # a sample is held until the next: a loop that chatters shows it
     size = float(np.sum(np.abs(power)))
     share = float(np.sum(power)) / size if size > 0.0 else 0.0
-    if share > -0.6:
+    blocks = np.array([piece.sum() for piece in np.array_split(power, SIGN_BLOCKS)])
+    scatter = float(np.std(blocks)) / math.sqrt(SIGN_BLOCKS)
+    one_way = abs(float(np.sum(way))) > 0.9 * far
+    if share > -0.6 and not (one_way and share < -0.05 and float(blocks.mean()) < -5.0 * scatter):
         return
     raise LogError(
         f"{run.log}: E-SIGN refuse: the torque opposes the motion (its work over the run is negative, "

@@ -112,7 +112,7 @@ def predict(
         shown = ", ".join(f"{value:.6g}" for value in cycles.undecided[:5])
         notes.append(f"{len(cycles.undecided)} values undecided, no cycle drawn there: {shown}")
     return Prediction(
-        diagram=replace(ideal, branches=rests + cycles.branches, bifurcations=cycles.onsets),
+        diagram=replace(ideal, branches=rests + cycles.branches, bifurcations=cycles.onsets, notes=()),
         loop=f"sampled every {sampling.period:g} s, {counts}, torque held, delay {sampling.delay} samples",
         notes=tuple(notes),
     )

@@ -13,7 +13,7 @@ from typing import Final
 
 from benchmarks.rows import Row, show
 
-PARTS: Final = ("bias", "coverage", "real_rigs", "smoother", "speed")
+PARTS: Final = ("bias", "coverage", "faults", "real_rigs", "smoother", "speed")
 
 
 def main() -> None:

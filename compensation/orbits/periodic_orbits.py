@@ -33,6 +33,7 @@ SAME_POINT: Final = 1e-7  # relative distance of points of a converged cycle tha
 VANISHED: Final = 1e-9  # of the start: what has become as small decays
 NEAR: Final = 1e-3  # relative distance from which shooting is tried
 UNREPEATED: Final = "no repetition within"
+DECAYS: Final = "decays to a point"
 NO_DERIVATIVE: Final = "the return has no derivative that leads on"
 
 
@@ -106,7 +107,7 @@ def find_cycle(section: ReturnMap, start: FloatArray) -> Cycle | NoCycle:
         if returns:
             return cycle_at(section, points[-1], returns)
         if float(np.max(np.abs(points[-1]))) <= VANISHED * float(np.max(np.abs(start))):
-            return NoCycle("decays to a point")
+            return NoCycle(DECAYS)
         if points.shape[0] >= PATIENCE:
             return NoCycle(f"{UNREPEATED} {points.shape[0]} returns")
         returns = _repeats(points, NEAR)

@@ -12,13 +12,16 @@ over all runs (`ident.fit.variance_model`), for which each run hands on the whit
 What a run has to survive:
 
 - E-QUANT: it must travel 20 counts, or its speed is the encoder's rounding;
-- E-STEADY: run-in and run-out are cut off; under half left, the run is left out;
+- E-STEADY: run-in and run-out are cut off, and what is left of a speed that drifts is its calmest part;
+  under half left, the run is left out;
+- E-SAT: with the torque at its limit in over 2 % of it, it is not what held the speed;
 - E-STICKSLIP: with the link at rest in over 2 % of it, its mean torque is not the friction at its mean speed.
 """
 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -31,7 +34,16 @@ from ident.evidence.segmentation import Stretch, grain, plateaus, rests, stretch
 LEAST_COUNTS = 20.0
 BLOCKS = 20  # a window is judged in twentieths
 STILL_SHARE = 0.02
+TINY = float(np.finfo(np.float64).tiny)
 RESOLVED_COUNTS = 6.0  # travel that tells motion from rest
+KEPT = 0.8  # part of a run that is left, below which its trimming is told
+LEAST_KEPT = 0.5
+SPEED_DRIFT = 0.03  # part of the speed by which it may change over a run
+TORQUE_DRIFT = 0.25  # part of the torque: a place may change it by as much
+CLEAR = 5.0  # standard errors of a slope that is one
+STRAIGHT = 0.8  # part of the way between two rests that a constant speed makes at least
+AT_LIMIT = 0.99  # part of the torque limit
+LIMITED_SHARE = 0.02
 
 
 @dataclass(frozen=True)
@@ -69,6 +81,7 @@ class SteadyRun:
     end_time: float  # [s]
     why: str | None = None  # why it is left out, beginning with its code
     place_stderr: float = 0.0  # of the mean torque, from what varies with position [N m]
+    trimmed: str | None = None  # what was cut off of a run that is used, beginning with its code
 
     @property
     def direction(self) -> int:
@@ -97,10 +110,42 @@ def steady_runs(recording: Recording) -> tuple[SteadyRun, ...]:
                 "loop's damping.",
             ),
         )
-    return tuple(_steady_run(recording, step) for step in steps)
+    steps = tuple(_without_bends(recording, steps))
+    if len(steps) == 1:  # then all motion of the log was meant as this speed
+        resting = sum(rest.last - rest.first for rest in still)
+        return (_steady_run(recording, steps[0], meant=recording.time.size - resting),)
+    return tuple(_steady_run(recording, step, meant=step.last - step.first) for step in steps)
 
 
-def _steady_run(recording: Recording, step: Stretch) -> SteadyRun:
+def _without_bends(recording: Recording, steps: Sequence[Stretch]) -> list[Stretch]:
+    """Neighbours between which the speed bends and does not jump are one run whose speed drifts."""
+    joined: list[Stretch] = []
+    for step in steps:
+        last = joined[-1] if joined else None
+        if last is not None and last.last == step.first and last.travel * step.travel > 0.0:
+            (_, before), (after, _) = _end_speeds(recording, last), _end_speeds(recording, step)
+            if abs(after - before) < 0.5 * abs(step.velocity - last.velocity):
+                joined[-1] = Stretch(
+                    last.first, step.last, last.duration + step.duration, last.travel + step.travel
+                )
+                continue
+        joined.append(step)
+    return joined
+
+
+def _end_speeds(recording: Recording, step: Stretch) -> tuple[float, float]:
+    """Speeds at the two ends of a step [rad/s], were they a line in time."""
+    middle = (step.first + step.last) // 2
+    end = min(step.last, recording.time.size - 1)
+    first, second = (
+        _travel(recording, a, b) / max(float(recording.time[b] - recording.time[a]), TINY)
+        for a, b in ((step.first, middle), (middle, end))
+    )
+    return first - 0.5 * (second - first), second + 0.5 * (second - first)
+
+
+def _steady_run(recording: Recording, step: Stretch, *, meant: int) -> SteadyRun:
+    """A step as a run, `meant` the number of samples that were to be of its speed."""
     counts = abs(step.travel) / grain(recording)
     if counts < LEAST_COUNTS:
         return replace(
@@ -120,14 +165,37 @@ def _steady_run(recording: Recording, step: Stretch) -> SteadyRun:
     window = _steady_window(recording, step)
     left = (window.last - window.first) / (step.last - step.first)
     run = _measure(recording, window)
-    if left < 0.5:
+    if left < LEAST_KEPT:
         return replace(
             run,
-            why=f"E-STEADY: speed or torque settles in only {100 * left:.0f} % of the run. Record it for "
-            "longer, or "
-            "set `window` to its steady part.",
+            why=f"E-STEADY: speed and torque are steady in only {100 * left:.0f} % of the run: its mean "
+            "torque is not the friction at one speed. Record it for longer, or set `window` to its steady "
+            "part.",
         )
-    return run
+    limited = _share_at_limit(recording, window)
+    if limited > LIMITED_SHARE:
+        return replace(
+            run,
+            why=f"E-SAT: the torque is at its limit of {recording.torque_limit:.4g} in {100 * limited:.0f} % "
+            "of the run: it is not what would hold the speed. Raise the limit, or run slower.",
+        )
+    left = (window.last - window.first) / meant
+    if left > KEPT:
+        return run
+    text = (
+        f"E-STEADY: speed and torque are steady in {100 * left:.0f} % of the run at {run.velocity:.3g} (from "
+        f"{run.start_time:.3g} s to {run.end_time:.3g} s); the rest was cut off, or it would have biased the "
+        "friction at this speed. Set `window` to say so."
+    )
+    return replace(run, trimmed=text)
+
+
+def _share_at_limit(recording: Recording, window: Stretch) -> float:
+    """Part of a window's samples at which the torque is at its limit; 0 where none is known."""
+    if recording.torque_limit is None:
+        return 0.0
+    torque = np.abs(recording.torque[window.first : window.last])
+    return float(np.mean(torque >= AT_LIMIT * recording.torque_limit))
 
 
 def _measure(recording: Recording, window: Stretch) -> SteadyRun:
@@ -216,6 +284,9 @@ def _steady_window(recording: Recording, step: Stretch) -> Stretch:
         start += 1
     while end > start and odd[end - 1]:
         end -= 1
+    drifting = ((speed, SPEED_DRIFT, float(np.median(rounding))), (torque, TORQUE_DRIFT, 0.0))
+    for values, allowed, least in drifting:
+        start, end = _calmest(values, start, end, allowed=allowed, error=least)
     first, past = int(edges[start]), int(edges[end])
     if past - first < 2:
         return Stretch(step.first, step.first + 2, float(duration[0]), 0.0)
@@ -225,6 +296,34 @@ def _steady_window(recording: Recording, step: Stretch) -> Stretch:
         float(recording.time[min(past, recording.time.size - 1)] - recording.time[first]),
         _travel(recording, first, past),
     )
+
+
+def _calmest(values: FloatArray, start: int, end: int, *, allowed: float, error: float) -> tuple[int, int]:
+    """The longest part of blocks start to end (exclusive) over which a line through them changes by no more
+    than `allowed` of its mean; all of them where the change is not clear of its error. `error` is a block's
+    least.
+    """
+
+    def change(a: int, b: int) -> tuple[float, float]:
+        number = np.arange(b - a) - 0.5 * (b - a - 1)
+        own = values[a:b]
+        slope = float(number @ own / (number @ number))
+        left = own - own.mean() - slope * number
+        scatter = max(float(np.sqrt(left @ left / max(b - a - 2, 1))), error)
+        return abs(slope) * (b - a), scatter * (b - a) / float(np.sqrt(number @ number))
+
+    if end - start < 4:
+        return start, end
+    most = allowed * abs(float(values[start:end].mean()))
+    whole, unsure = change(start, end)
+    if whole <= most or whole <= CLEAR * unsure:
+        return start, end
+    for size in range(end - start - 1, 1, -1):
+        parts = [(change(a, a + size)[0], a) for a in range(start, end - size + 1)]
+        least, a = min(parts)
+        if least <= most:
+            return a, a + size
+    return start, start + 1
 
 
 def _spread(values: FloatArray) -> float:
@@ -251,13 +350,20 @@ def _share_at_rest(recording: Recording, step: Stretch) -> float:
 def _sticks_and_slips(recording: Recording, still: tuple[Stretch, ...], steps: tuple[Stretch, ...]) -> bool:
     """Whether the log alternates between rests and slips of changing speed, always the same way.
 
-    A staircase with rests has one straight stretch a span; a slip is bent throughout.
+    A staircase with rests has one straight stretch a span that is most of it; a slip is bent throughout, or
+    in several parts.
     """
     moving_one_way = abs(sum(step.travel for step in steps)) > 0.9 * sum(abs(step.travel) for step in steps)
     if len(still) < 4 or not moving_one_way:
         return False
     bends = [_bend(recording, step) for step in steps]
-    return len(steps) >= 2 * (len(still) - 1) and float(np.median(bends)) > 0.025
+    bent = len(steps) >= 2 * (len(still) - 1) and float(np.median(bends)) > 0.025
+    largest = []
+    for before, after in itertools.pairwise(still):
+        slip = abs(_travel(recording, before.last, after.first))
+        own = [abs(step.travel) for step in steps if before.last <= step.first and step.last <= after.first]
+        largest.append(max(own, default=0.0) / max(slip, TINY))
+    return bent or float(np.median(largest)) < STRAIGHT
 
 
 def _bend(recording: Recording, step: Stretch) -> float:

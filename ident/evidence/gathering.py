@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -18,6 +19,9 @@ from ident.evidence.hunting import SAMPLES, hunts, sensor_noise
 from ident.evidence.momentum import Momentum, momentum
 from ident.evidence.position_ripple import Wave, find_waves, traces_of
 from ident.evidence.ripple_correction import corrected_motions, corrected_runs, corrected_starts
+
+NEAR = 3.0  # ratio of speeds within which friction is of one size
+ABSURD = 50.0  # ratio of two torques, or two inertias, that ought to be of one size
 
 
 class IdentificationError(LogError):
@@ -51,13 +55,13 @@ def gather(recordings: Sequence[Recording]) -> Evidence:
     runs: list[SteadyRun] = []
     starts: list[Breakaway] = []
     momenta: list[Momentum] = []
-    for recording in recordings:
-        if recording.protocol == "constant_velocity":
-            runs += steady_runs(recording)
-        elif recording.protocol == "breakaway":
-            own = breakaways(recording)
+    for part in chain.from_iterable(recording.parts() for recording in recordings):
+        if part.protocol == "constant_velocity":
+            runs += steady_runs(part)
+        elif part.protocol == "breakaway":
+            own = breakaways(part)
             starts += own
-            motions = (momentum(recording, start) for start in own if start.why is None)
+            motions = (momentum(part, start) for start in own if start.why is None)
             momenta += [motion for motion in motions if motion is not None]
     response, reasons = frequency_inertia(_of(recordings, "frequency_response"))
     inertia = response.inertia if response is not None else _rough_inertia(runs, momenta)
@@ -106,9 +110,10 @@ def _without_hunting(
 
 
 def require_evidence(recordings: Sequence[Recording], evidence: Evidence) -> None:
-    """Raise `IdentificationError` where no direction has a steady run, or the torque's sign is wrong."""
+    """Raise `IdentificationError` without a steady run, or where the torque has the wrong sign or unit."""
     _require_a_direction(recordings, evidence)
     _require_sign(evidence)
+    _require_one_unit(evidence)
 
 
 def run_uses(recordings: Sequence[Recording], evidence: Evidence) -> tuple[RunUse, ...]:
@@ -151,6 +156,10 @@ def run_findings(evidence: Evidence) -> tuple[Finding, ...]:
             continue
         severity = Severity.WARN if code in {"E-CREEP", "E-SAT"} else Severity.WITHHOLD
         found.append(Finding(code, severity, f"{log}, {where:.3g} s: {text}", log))
+    trimmed = [run for run in evidence.used_runs if run.trimmed is not None]
+    for run in trimmed:
+        code, _, text = str(run.trimmed).partition(": ")
+        found.append(Finding(code, Severity.WARN, f"{run.log}: {text}", run.log))
     return tuple(found)
 
 
@@ -192,3 +201,38 @@ def _require_sign(evidence: Evidence) -> None:
             "-1` for "
             "torque or for position in [signals]."
         )
+
+
+def _require_one_unit(evidence: Evidence) -> None:
+    """E-UNIT: the torque of some logs in another unit than that of the others.
+
+    Friction at rest and in motion, and the inertia by two protocols, differ by parts and not by a hundred.
+    """
+    steady = [(abs(run.velocity), abs(run.torque), run.log) for run in evidence.used_runs]
+    typical = float(np.median([torque for _, torque, _ in steady]))
+    for speed, torque, log in steady:
+        near = [own for other, own, name in steady if name != log and NEAR**-1 < other / speed < NEAR]
+        if len(near) >= 3:
+            _require_same(
+                torque, float(np.median(near)), f"{log}: the torque at {speed:.3g} rad/s", "other logs"
+            )
+    starts = [abs(start.torque) for start in evidence.used_starts]
+    if starts and typical > 0.0:
+        log = evidence.used_starts[0].log
+        _require_same(float(np.median(starts)), typical, f"{log}: the breakaway torque", "constant speeds")
+    rough = _rough_inertia(evidence.runs, evidence.momenta)
+    if evidence.response is not None and rough is not None:
+        log = evidence.response.fits[0].log
+        _require_same(evidence.response.inertia, rough, f"{log}: the implied inertia", "breakaways")
+
+
+def _require_same(own: float, others: float, what: str, source: str) -> None:
+    ratio = own / others if others > 0.0 else 1.0
+    if ABSURD**-1 < ratio < ABSURD:
+        return
+    raise IdentificationError(
+        f"E-UNIT: {what} is {own:.4g}, that of the {source} {others:.4g}: {ratio:.4g} times. No friction or "
+        "inertia of one rig changes so much: the torque of one of them looks like another unit (mN m, or A "
+        "without its torque constant), and all torques and the inertia would be off by such a factor. "
+        "Correct `unit` or `scale` of the torque for those logs, or exclude them."
+    )

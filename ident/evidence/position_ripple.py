@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from data.recording import FloatArray, Recording
 from ident.evidence.friction_map import SteadyRun
+from ident.evidence.wave_sums import wave_sums
 
 BLOCKS = 300  # a run, at most
 LEAST_BLOCKS = 24
@@ -38,6 +39,7 @@ OWN_WAVES = 1.0  # in a run that is asked for a phase of its own
 FINEST = 1.2  # largest phase that a block may cover
 NEIGHBOURS = 150  # wavenumbers on each side of a wave whose power is the background
 STANDS_OUT = 50.0  # power of a wave over the background, where 4 are expected of noise
+HEARD = 6.0  # power of a wave in one run over the background, which noise has in 5 % of the runs
 AGREE = 0.8  # part of the runs' own power that the common phase keeps
 MOST_WAVES = 4
 APART = 2.0  # waves over the typical run by which two differ
@@ -218,9 +220,10 @@ def _sums(own: Trace, grid: FloatArray, noise: float) -> Sums:
     seen = grid * own.stride < FINEST
     right, left = np.zeros((grid.size, 2)), np.zeros((grid.size, 2, 2))
     if noise > 0 and np.any(seen):
-        waves = own.waves(grid[seen])
-        right[seen] = np.einsum("mxw,m->wx", waves, own.torque) / noise
-        left[seen] = np.einsum("mxw,myw->wxy", waves, waves, optimize=True) / noise
+        sums = wave_sums(
+            grid[seen], position=own.position, torque=own.torque, smooth=own.smooth, stride=own.stride
+        )
+        right[seen], left[seen] = (each / noise for each in sums)
     return right, left
 
 
@@ -364,10 +367,14 @@ def _pooled(both: Solved) -> Solved:
 def _incoherent(
     traces: Sequence[Trace], grid: FloatArray, noise: Sequence[float], own: FloatArray
 ) -> list[Wave]:
-    """A wave on whose phase the runs do not agree, of the amplitude that they show."""
+    """A wave on whose phase the runs do not agree, of the amplitude that they show.
+
+    A run, or two at one speed, may owe a wave to their time, as a speed loop's swing or the encoder's counts
+    under its samples: half of the runs have to show it.
+    """
     peak = int(np.argmax(own))
     at = grid[peak : peak + 1]
-    after, squares = [], []
+    after, squares, whole = [], [], []
     for run, variance in zip(traces, noise, strict=True):
         torque = run.torque
         if at[0] * run.travel > 2 * np.pi * OWN_WAVES and at[0] * run.stride < FINEST and variance > 0:
@@ -375,10 +382,17 @@ def _incoherent(
             both = np.linalg.solve(left[0], right[0])
             torque = torque - run.waves(at)[:, :, 0] @ both
             squares.append(float(both @ both))
+            whole.append(run)
         after.append(Trace(run.direction, run.position, torque, run.smooth, run.stride))
     quiet = _noise(after)
     background = float(_background(_power(after, grid, quiet)[1])[peak])
-    if len(squares) < 2 or float(_power(traces, at, quiet)[1][0]) < 2.0 * STANDS_OUT * background:
+    heard = [
+        float(_explained(*_sums(run, at, variance))[0])
+        for run, variance in zip(traces, quiet, strict=True)
+        if any(run is own for own in whole)
+    ]
+    showing = sum(power > HEARD * background for power in heard)
+    if len(heard) < 2 or 2 * showing < len(heard) or sum(heard) < 2.0 * STANDS_OUT * background:
         return []
     nothing: dict[int, FloatArray] = {}
     amplitude = float(np.median(squares)) ** 0.5

@@ -58,7 +58,7 @@ def diagram_document(diagram: Diagram, *, loop: str, notes: Sequence[str] = ()) 
             for branch in diagram.branches
         ],
         "bifurcations": [{diagram.parameter: one.value, "kind": one.kind} for one in diagram.bifurcations],
-        "notes": list(notes),
+        "notes": [*diagram.notes, *notes],
     }
 
 

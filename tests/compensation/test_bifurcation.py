@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from compensation.bifurcation import Branch, Diagram, diagram, where_it_ends
-from compensation.closed_loop import ClosedLoop
+from compensation.closed_loop import ClosedLoop, simulate
 from compensation.coexistence import largest_compensation_with_rest
 from compensation.controller import Controller, Gains
 from compensation.loop_section import LoopSection
@@ -255,3 +255,22 @@ def test_bad_input_is_named() -> None:
         diagram(loop(), "n1", [1.0])  # type: ignore[arg-type]  # wrong on purpose
     with pytest.raises(ModelError, match="ascend"):
         diagram(loop(), "r", [1.0, 0.9])
+
+
+def test_a_fast_observer_hides_no_cycle() -> None:
+    """As L grows the estimate becomes the velocity; the cycle of r > 1 stays, with a limit of its own."""
+    for observer in (1e4, 1e6):
+        case = loop(1.1, observer)
+        (cycles,) = [b for b in diagram(case, "r", [1.1]).branches if b.kind == "limit_cycle"]
+        run = simulate(case, (0.15, 0.0, 0.0), duration=6.0, times=())
+        halts = [abs(event.state[0]) for event in run.events if event.kind == "velocity reversal"]
+        assert cycles.points[0].amplitude == pytest.approx(halts[-1], rel=1e-4)
+
+
+def test_what_is_not_resolved_is_said() -> None:
+    found = diagram(loop(1.1, 1e9), "r", [1.1])
+    assert not any(branch.kind == "limit_cycle" for branch in found.branches)
+    (note,) = found.notes
+    assert "r = 1.1 to 1.1" in note
+    assert "step limit" in note
+    assert diagram(loop(1.1), "r", [0.9, 1.0, 1.1]).notes == ()

@@ -121,3 +121,36 @@ def test_a_hypothesis_that_fails_by_little_says_so(r: float) -> None:
     says = named(short, "contraction").says  # L_c = 73.0704
     assert says.startswith("L = 73.07 1/s is 0.0004")
     assert "short of 73.07 1/s" in says
+
+
+def test_a_margin_is_negative_or_none_where_a_statement_fails() -> None:
+    robot = symmetric_robot()
+    heavy = replace(robot, inertia=1.1 * robot.inertia)
+    own = named(certificates(robot, Controller(gains(80.0), heavy), law="mean"), "the compensator carries")
+    assert (own.holds, own.margin) == (False, None)
+    assert "inertia" in own.says
+    curve = replace(robot.friction.positive, viscous_damping=0.0)
+    free = OneLinkRobot(0.026, StribeckFriction.symmetric(curve))
+    undamped = Controller(Gains(0.4, 0.0, observer=200.0, compensation=1.0), free)
+    theorem = named(certificates(free, undamped, law="mean"), "theorem")
+    assert (theorem.holds, theorem.margin) == (False, 0.0)
+    assert "no damping" in theorem.says
+
+
+def test_what_no_law_shows_is_no_difference() -> None:
+    """Without a Stribeck effect friction is Coulomb's whatever v_s and beta are."""
+    curve = replace(symmetric_robot().friction.positive, static_torque=0.4, coulomb_torque=0.4)
+    robot = OneLinkRobot(0.026, StribeckFriction.symmetric(curve))
+    other = replace(curve, stribeck_velocity=1.0, stribeck_shape=0.7)
+    model = OneLinkRobot(0.026, StribeckFriction.symmetric(other))
+    found = certificates(robot, Controller(gains(10.0), model), law="mean")
+    assert named(found, "the compensator carries").holds
+    assert named(found, "theorem").holds
+
+
+@given(robots(), controllers())
+def test_margins_have_the_sign_of_their_statement(robot: OneLinkRobot, controller: Controller) -> None:
+    for one in (Controller(controller.gains, robot), controller):
+        for statement in certificates(robot, one, law="any"):
+            if statement.margin is not None:
+                assert statement.margin >= 0.0 if statement.holds else statement.margin <= 0.0

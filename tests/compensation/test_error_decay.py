@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq
 
 from compensation.certificates import certificates
 from compensation.closed_loop import ClosedLoop, simulate
@@ -142,3 +143,44 @@ def test_the_mean_law_on_the_real_rig_leaves_an_error() -> None:
     gains = Gains(0.4, 0.02, observer=100.0, compensation=1.0)
     run = simulate(ClosedLoop(robot, Controller(gains, robot.mean())), (0.6, 0.0, 0.0), duration=20.0)
     assert float(np.max(np.abs(run.state[run.time > 15.0, 2]))) > 1e-3
+
+
+@given(stribeck_curves(STEEP), stribeck_curves(STEEP), st.floats(1.0, 40.0), st.floats(0.0, 2.0))
+@settings(max_examples=20, deadline=None)
+def test_two_errors_under_one_estimate_approach_at_the_rate(
+    positive: StribeckCurve, negative: StribeckCurve, above: float, r: float
+) -> None:
+    """Whatever compensates: by implicit Euler of the inclusion for v, a prescribed x2(t) = sin 5t, any r.
+
+    A step of it shrinks the distance of two solutions by 1/(1 + h rate) at least, if errors contract so.
+    """
+    robot = OneLinkRobot(0.026, StribeckFriction(positive, negative))
+    observer = max(critical_observer_gains(robot).worst, 0.0) + above
+    rate, step = observer_error_decay(robot, observer), 0.02 / observer
+    errors = [0.3, -0.2]
+    for time in step * np.arange(1, 40):
+        x2 = float(np.sin(5.0 * time))
+        told = (positive if x2 > 0.0 else negative).total(abs(x2)) * np.sign(x2) * r
+        after = [_implicit(robot, observer, step, x2, error, float(told)) for error in errors]
+        apart, before = abs(after[0] - after[1]), abs(errors[0] - errors[1])
+        assert apart <= before / (1.0 + step * rate) + 1e-12
+        errors = after
+
+
+def _implicit(
+    robot: OneLinkRobot, observer: float, step: float, x2: float, error: float, told: float
+) -> float:
+    """e after a step of e' = -L e + (told - b v - F(v))/J, v = x2 + e."""
+
+    def missing(v: float, curve: StribeckCurve, side: float) -> float:
+        friction = side * float(curve.total(abs(v)))
+        return (v - x2) * (1.0 + step * observer) - error - step * (told - friction) / robot.inertia
+
+    positive, negative = robot.friction.positive, robot.friction.negative
+    if missing(0.0, positive, 1.0) < 0.0:
+        v = brentq(missing, 0.0, 1e3, args=(positive, 1.0), xtol=1e-15)
+    elif missing(0.0, negative, -1.0) > 0.0:
+        v = brentq(missing, -1e3, 0.0, args=(negative, -1.0), xtol=1e-15)
+    else:
+        v = 0.0
+    return float(v) - x2

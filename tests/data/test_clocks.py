@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from data.clocks import clock_report, clock_report_ns
+from data.clocks import advancing, clock_report, clock_report_ns
 
 
 def test_rate_jitter_gaps_and_stalls() -> None:
@@ -34,3 +36,60 @@ def test_one_stamp_that_was_never_set_does_not_blur_the_others() -> None:
     assert report.rate == 1000.0
     assert report.jitter == 0.0
     assert report.gaps == 1
+
+
+REGULAR = np.arange(1000, dtype=np.float64) * 1e-3
+
+
+def test_a_clock_that_advances_is_left_alone() -> None:
+    found = advancing(REGULAR, fewest=10)
+    assert found.first is None
+    assert found.time is REGULAR
+
+
+@settings(max_examples=200, deadline=None)
+@given(back=st.floats(1e-6, 2.0), place=st.integers(20, 980))
+def test_a_clock_that_is_set_back_is_split_there(back: float, place: int) -> None:
+    time = REGULAR.copy()
+    time[place:] -= 1e-3 + back
+    found = advancing(time, fewest=10)
+    assert found.breaks == (place,)
+    assert np.array_equal(found.kept, np.arange(1000))
+    assert np.all(np.diff(found.time) > 0)
+    assert np.allclose(np.delete(np.diff(found.time), place - 1), 1e-3)
+
+
+@given(places=st.sets(st.integers(1, 330), max_size=20), stamp=st.sampled_from([0.0, 9.0, None]))
+def test_a_wrong_stamp_between_right_ones_costs_its_sample(places: set[int], stamp: float | None) -> None:
+    wrong = 3 * np.array(sorted(places), np.intp)
+    time = REGULAR.copy()
+    time[wrong] = time[wrong - 1] if stamp is None else stamp
+    found = advancing(time, fewest=10)
+    assert found.breaks == ()
+    assert np.array_equal(found.kept, np.delete(np.arange(1000), wrong))
+    assert np.array_equal(found.time, REGULAR[found.kept])
+
+
+@given(places=st.sets(st.integers(0, 89), max_size=30), late=st.integers(1, 8))
+def test_late_samples_are_sorted_in(places: set[int], late: int) -> None:
+    order = np.arange(1000)
+    for place in places:
+        first = 10 + 11 * place
+        order[first : first + late + 1] = np.roll(order[first : first + late + 1], -1)
+    found = advancing(REGULAR[order], fewest=10)
+    assert found.late == len(places) or late == 1
+    assert np.array_equal(found.time, REGULAR)
+    assert np.array_equal(order[found.kept], np.arange(1000))
+
+
+@settings(deadline=None)
+@given(
+    st.lists(st.one_of(st.floats(-1e3, 1e3), st.integers(0, 5).map(float)), min_size=1, max_size=60),
+    st.integers(1, 12),
+)
+def test_any_stamps_come_out_advancing(stamps: list[float], fewest: int) -> None:
+    found = advancing(np.array(stamps), fewest=fewest)
+    assert np.all(np.diff(found.time) > 0) or found.first is None
+    assert found.kept.size + found.wrong + found.short == len(stamps)
+    edges = np.diff([0, *found.breaks, found.kept.size])
+    assert found.first is None or not found.kept.size or edges.min() >= fewest

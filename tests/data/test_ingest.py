@@ -224,14 +224,17 @@ def test_clocks(tmp_path: Path, encoding: str) -> None:
     assert np.allclose(read(path, timed).time, np.arange(500, dtype=np.float64) * 1e-3, atol=1e-12)
 
 
-def test_a_clock_that_jumps_back_is_refused(tmp_path: Path) -> None:
+def test_a_clock_that_jumps_back_splits_the_run(tmp_path: Path) -> None:
     time = TIME.copy()
     time[1500:] -= 0.5
     path = write(tmp_path / "run.mcap", time=time)
-    with pytest.raises(
-        LogError, match=r"run.mcap: E-CLOCK refuse: the clock .header stamps. jumps back by 0.499 s"
-    ):
-        read(path)
+    got = read_recording(path, log="run.mcap", protocol="constant_velocity", signals=MCAP)
+    assert [(f.code, f.severity) for f in got.findings] == [("E-CLOCK", Severity.WARN)]
+    assert "the clock (header stamps) jumps back by 0.499 s" in got.findings[0].text
+    first, second = got.parts()
+    assert np.allclose(first.time, TIME[:1500], atol=1e-9)
+    assert np.allclose(np.diff(second.time), np.diff(TIME[1500:]), atol=1e-9)
+    assert np.array_equal(np.concatenate((first.position, second.position)), got.position)
 
 
 def test_damage_is_told_before_what_it_leaves_missing(tmp_path: Path) -> None:

@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from data.findings import LogError, Severity
+from data.protocols import ProtocolName
 from data.resolution import lattice_spacing
-from data.screening import Screened, Signals, screen
+from data.screening import Screened, Signals, require_count, screen
 
 COUNT = 2 * math.pi / 2**18
 
@@ -58,12 +59,24 @@ def test_a_stick_and_a_sudden_breakaway_are_no_fault() -> None:
     assert got.findings == ()
 
 
-def test_clocks_that_do_not_advance_are_refused() -> None:
+@pytest.mark.parametrize("protocol", ["constant_velocity", "frequency_response"])
+def test_a_clock_that_is_set_back_splits_the_run(protocol: ProtocolName) -> None:
+    run = replace(motion(), protocol=protocol)
+    time = run.time.copy()
+    time[3000:] -= 0.5
+    got = screened(replace(run, time=time))
+    assert [(f.code, f.severity) for f in got.findings] == [("E-CLOCK", Severity.WARN)]
+    assert "jumps back by 0.499 s at sample 3000, t = 2.999" in got.findings[0].text
+    whole = protocol == "constant_velocity"
+    assert got.signals.breaks == ((3000,) if whole else ())
+    assert np.array_equal(got.signals.position, run.position if whole else run.position[:3000])
+    assert np.all(np.diff(got.signals.time) > 0.0)
+
+
+def test_a_clock_that_hardly_runs_is_refused() -> None:
     run = motion()
-    for shift, what in ((-0.001, "stands still"), (-0.5, "jumps back by 0.499")):
-        time = run.time.copy()
-        time[2000:] += shift
-        with pytest.raises(LogError, match=f"run: E-CLOCK refuse.*{what}.* at sample 2000, t = 1.999"):
+    for time in (np.zeros(4000), np.floor(run.time * 200.0) / 200.0):
+        with pytest.raises(LogError, match=r"run: E-CLOCK refuse.*stands still at sample 1, t = 0"):
             screened(replace(run, time=time))
 
 
@@ -167,3 +180,17 @@ def test_the_count_is_found_on_a_lattice_and_nowhere_else(count: float, speed: f
 def test_a_straight_line_has_no_count() -> None:
     assert lattice_spacing(np.arange(5000, dtype=np.float64) * 0.005) is None
     assert lattice_spacing(np.zeros(100)) is None
+
+
+def test_positions_in_another_unit_than_the_declared_count_are_refused() -> None:
+    for factor, text in ((180.0 / math.pi, "57.30.*degrees"), (0.5 / math.pi, "0.1592.*revolutions")):
+        with pytest.raises(LogError, match=f"run: E-UNIT refuse.*{text}"):
+            require_count(motion(), found=COUNT * factor, declared=COUNT)
+    for factor in (0.25, 0.5, 1.0, 2.0, 4.0):  # interpolated, or a quadrature not counted
+        require_count(motion(), found=COUNT * factor, declared=COUNT)
+
+
+def test_a_torque_far_beyond_its_limit_is_refused() -> None:
+    run = motion()
+    with pytest.raises(LogError, match=r"E-UNIT refuse: the torque reaches.*times the torque limit of 2"):
+        screened(replace(run, torque=1000.0 * run.torque), torque_limit=2.0)

@@ -11,7 +11,9 @@ from ident.estimate import Covariance, Estimate
 from ident.evidence.gathering import IdentificationError
 from ident.excitation.excited_law import ExcitedLaw, excited_law
 from ident.fit.assumptions import Assumptions
-from ident.identification import Identification, _with_excitation, identify
+from ident.from_excitation import with_excitation
+from ident.identification import identify
+from ident.identified import Identification
 from tests.ident.excitation.loop_rig import followed, swings
 from tests.ident.excitation.test_excited_law import PLAIN, rig_of
 
@@ -63,12 +65,12 @@ def test_beside_other_logs_the_inertia_stands_where_there_is_no_other() -> None:
         notes=(),
     )
     without: Identification = replace(alone, robot=robot)
-    found = _with_excitation(without, excited).robot
+    found = with_excitation(without, excited).robot
     assert found.inertia.value == alone.robot.inertia.value
     assert found.covariance.names == ("inertia", "positive.coulomb_torque")
     other = Estimate(0.03, "kg m^2", stderr=1e-5)
     with_other = replace(without, robot=replace(robot, inertia=other))
-    found = _with_excitation(with_other, excited).robot
+    found = with_excitation(with_other, excited).robot
     assert found.inertia == other
     assert found.inertia_sources["excitation"].value == alone.robot.inertia.value
     assert [note.code for note in found.notes] == ["E-LACKOFFIT"]
