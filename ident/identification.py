@@ -12,6 +12,7 @@ responses (`ident.evidence`).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -34,6 +35,7 @@ from ident.fit.assumptions import DEFAULT, Assumptions
 from ident.fit.breakaway_summary import breakaway_summaries
 from ident.fit.circumstances import circumstances
 from ident.fit.cross_check import bootstrap_table
+from ident.fit.gravity import without_gravity
 from ident.fit.law_model import DIRECTIONS, SIGN
 from ident.fit.map_points import friction_map
 from ident.fit.one_stage import explain
@@ -80,7 +82,11 @@ def _from_evidence(
     """The law from constant speeds, breakaways and frequency responses."""
     axis = recordings[0].axis
     require_evidence(recordings, evidence)
-    explained = explain(evidence, axis=axis, assumptions=assumptions)
+    explanation = partial(explain, axis=axis, assumptions=assumptions)
+    if axis == "rotary":
+        evidence, explained = without_gravity(recordings, evidence, explanation)
+    else:
+        explained = explanation(evidence)
     values = explained.values
     notes = [
         *log_findings(recordings),

@@ -19,6 +19,7 @@ from ident.evidence.friction_map import SteadyRun
 from ident.evidence.momentum import Momentum
 from ident.evidence.position_ripple import Wave
 
+TURN = 0.1  # by which the cycles a turn of gravity may differ from one
 NODES = 2000  # places of a run over which a wave is averaged
 
 
@@ -33,6 +34,7 @@ def corrected_runs(
         first, past = np.searchsorted(recording.time, [run.start_time, run.end_time])
         place = recording.position[first : past + 1 : max(1, (past - first) // NODES)]
         torque, error = _mean(waves, place, run.direction)
+        error = float(np.hypot(run.place_stderr, error))
         corrected.append(replace(run, torque=run.torque - torque, place_stderr=error))
     return tuple(corrected)
 
@@ -43,7 +45,7 @@ def corrected_starts(starts: Sequence[Breakaway], waves: Sequence[Wave]) -> tupl
     for start in starts:
         torque, error = _mean(waves, np.array([start.place]), start.direction)
         line = replace(start.line, torque=start.line.torque - torque)
-        corrected.append(replace(start, line=line, place_stderr=error))
+        corrected.append(replace(start, line=line, place_stderr=float(np.hypot(start.place_stderr, error))))
     return tuple(corrected)
 
 
@@ -65,11 +67,13 @@ def corrected_motions(momenta: Sequence[Momentum], waves: Sequence[Wave]) -> tup
 def ripple_findings(waves: Sequence[Wave], axis: Axis) -> tuple[Finding, ...]:
     """A finding for each wave."""
     torque, length = ("N m", "rad") if axis == "rotary" else ("N", "m")
+    turn = axis == "rotary"
     found = []
     for wave in waves:
         seen = (
             f"the torque varies with position, with an amplitude of {wave.amplitude:.3g} {torque} and a "
             f"wavelength of {wave.wavelength:.3g} {length}"
+            + (", one turn: an unbalanced link under gravity" if turn and is_turn(wave) else "")
         )
         if wave.coherent:
             text = (
@@ -82,6 +86,11 @@ def ripple_findings(waves: Sequence[Wave], axis: Axis) -> tuple[Finding, ...]:
             )
         found.append(Finding("E-POSITION", Severity.WARN, text))
     return tuple(found)
+
+
+def is_turn(wave: Wave) -> bool:
+    """Whether a wave goes once around a turn [rad], as gravity does."""
+    return abs(wave.wavenumber - 1.0) < TURN
 
 
 def _mean(waves: Sequence[Wave], place: FloatArray, direction: int) -> tuple[float, float]:

@@ -1,14 +1,8 @@
-r"""What the residuals of the settled fit betray: drift, gravity, errors of speed, a law that does not fit.
+r"""What the residuals of the settled fit betray: drift, errors of speed, a law that does not fit.
 
-A cause that the law leaves out is tested as a column that is added to it. With e the residuals in standard
-errors and A the derivatives of the law's predictions in the same, the column x is seen only so far as the law
-cannot imitate it, x - A (A^+ x); its size and its F ratio follow by least squares (the test of an added
-variable; Cook and Weisberg 1982, sec. 2.4.4). So a drift over speeds that were run in order is not called
-certain where it may as well be damping. The scatter is that of the residuals, not of the weights.
+A cause that the law leaves out is tested as a column added to it (`ident.fit.added_columns`).
 
 - E-DRIFT: friction that grows or falls with time, in parts of itself, or an offset of the torque that does.
-- E-POSITION: a torque with sin q and cos q, as gravity makes it; ripple is found within the runs
-  (`ident.evidence.position_ripple`).
 - E-LACKOFFIT: runs at one speed that scatter less about each other than about the law; residuals that keep
   their sign over many speeds; or that follow slow waves over the ranks of the speeds, as those of a law of
   another shape do (a smooth test: Eubank and Hart 1992).
@@ -18,9 +12,6 @@ certain where it may as well be damping. The scatter is that of the residuals, n
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
@@ -29,30 +20,18 @@ from scipy.stats import rankdata
 from data.findings import Finding, Severity
 from data.recording import Axis, FloatArray
 from ident.evidence.gathering import Evidence
-from ident.evidence.position_ripple import Wave
+from ident.fit.added_columns import CHANCE, added
 from ident.fit.circumstances import Circumstances
 from ident.fit.law_model import SIGN
 from ident.fit.parameters import UNITS
-from ident.fit.predictions import directions, gradient, measured, predicted, stderr
+from ident.fit.predictions import directions, measured, predicted
 from ident.fit.residual_tests import runs_test
 from ident.fit.weighting import Weighted, law_slopes
 
-CHANCE = 0.002  # of each test where nothing is wrong
-SPARE = 4  # least number of data beyond parameters and added columns
-IMITATED = 0.05  # part of the columns' mean square that the law must leave, or nothing can be said
 WAVES = 6  # slow ones over the ranks of the speeds
 SAME_SPEED = 0.02  # relative difference of speeds that are replicates
 LEAST_REPLICATES = 3  # degrees of freedom within speeds
 SPEED_SHARE = 0.3  # of the torque's error
-TURN = 0.1  # by which a wave's number of cycles a turn may differ from one to be gravity
-
-
-@dataclass(frozen=True)
-class Added:
-    """Columns added to the law: coefficients in N m a unit of the column, and the chance of their F ratio."""
-
-    coefficients: FloatArray  # (k,) [N m / unit of the column]
-    chance: float  # p value [-]
 
 
 def residual_findings(
@@ -61,47 +40,11 @@ def residual_findings(
     """Everything that the residuals betray."""
     found = [
         *_drift(weighted, seen, axis),
-        *(_gravity(evidence.waves, weighted, seen) if axis == "rotary" else []),
         *_replicates(weighted),
         *_bends(weighted),
         *_speed_errors(evidence, weighted),
     ]
     return tuple(found)
-
-
-def added(weighted: Weighted, columns: FloatArray, groups: FloatArray | None = None) -> Added | None:
-    """The F test of columns (n + m, k) [N m] that are added to the law; None where nothing can be said.
-
-    `groups` (n + m, g) are columns that both models have.
-    """
-    error = stderr(weighted.data)
-    residual = (measured(weighted.data) - predicted(weighted.data, weighted.fit.values)) / error
-    law = gradient(weighted.data, weighted.fit)
-    if groups is not None:
-        law = np.column_stack([law, groups])
-    span = _orthonormal(law / error[:, None])
-    left = residual - span @ (span.T @ residual)
-    column = columns / error[:, None]
-    own = column - span @ (span.T @ column)
-    directions_left, sizes, turned = np.linalg.svd(own, full_matrices=False)
-    seen = sizes**2 > IMITATED * np.sum(column**2) / column.shape[1]
-    rank = int(np.count_nonzero(seen))
-    spare = residual.size - span.shape[1] - rank
-    if spare < SPARE or rank == 0:
-        return None
-    share = directions_left[:, seen].T @ left
-    rest = float(np.sum(left**2) - np.sum(share**2))
-    if rest <= 0.0:
-        return None
-    chance = float(fisher.sf(float(np.sum(share**2)) / rank / (rest / spare), rank, spare))
-    return Added(np.asarray(turned[seen].T @ (share / sizes[seen])), chance)
-
-
-def _orthonormal(columns: FloatArray) -> FloatArray:
-    """A basis (n, r) of what columns (n, p) span; columns of zeros span nothing."""
-    size = np.linalg.norm(columns, axis=0)
-    left, values, _ = np.linalg.svd(columns[:, size > 0] / size[size > 0], full_matrices=False)
-    return np.asarray(left[:, values > 1e-9 * values[0]])
 
 
 def _drift(weighted: Weighted, seen: Circumstances, axis: Axis) -> list[Finding]:
@@ -117,8 +60,8 @@ def _drift(weighted: Weighted, seen: Circumstances, axis: Axis) -> list[Finding]
     sign, unit = directions(weighted.data), UNITS[axis]["torque_offset"]
     # The mean of one group is the law's; those of many logs are not, or drift between them would count.
     means = np.column_stack(groups) if len(groups) > 1 else np.zeros((time.size, 0))
-    friction = added(weighted, (time / span * size)[:, None], means * size[:, None])
-    offset = added(weighted, (time / span * sign)[:, None], means * sign[:, None])
+    friction = added(weighted, (time / span * size)[:, None], groups=means * size[:, None])
+    offset = added(weighted, (time / span * sign)[:, None], groups=means * sign[:, None])
     over = f"over {span:.3g} s of recording" if len(groups) == 1 else f"within logs, over {span:.3g} s"
     advice = "Warm the rig up, repeat the first speed at the end, and mix the order of the speeds."
     if friction is not None and friction.chance < CHANCE:
@@ -137,22 +80,6 @@ def _drift(weighted: Weighted, seen: Circumstances, axis: Axis) -> list[Finding]
         )
         return [Finding("E-DRIFT", Severity.WARN, text)]
     return []
-
-
-def _gravity(waves: Sequence[Wave], weighted: Weighted, seen: Circumstances) -> list[Finding]:
-    if any(abs(wave.wavenumber - 1.0) < TURN for wave in waves):
-        return []
-    sign = directions(weighted.data)[:, None]
-    found = added(weighted, np.column_stack([seen.sine, seen.cosine]) * sign)
-    if found is None or found.chance >= CHANCE:
-        return []
-    amplitude = float(np.hypot(*found.coefficients))
-    text = (
-        f"the torque varies with sin q and cos q, with an amplitude of {amplitude:.3g} N m from run to run "
-        f"(p = {found.chance:.1g}), as an unbalanced link under gravity does: it is in F_c and F_s of runs "
-        "that do not cover whole turns. Run over whole turns, balance the link, or start all from one place."
-    )
-    return [Finding("E-POSITION", Severity.WARN, text)]
 
 
 def _replicates(weighted: Weighted) -> list[Finding]:

@@ -28,14 +28,12 @@ def _seen(data: int, generator: np.random.Generator) -> Circumstances:
     return Circumstances(time, np.zeros(data, dtype=np.int64), np.sin(place), np.cos(place))
 
 
-def _findings(
-    change: Change, seed: int, *, speeds: FloatArray = SPEEDS, axis: str = "rotary"
-) -> tuple[Finding, ...]:
+def _findings(change: Change, seed: int, *, speeds: FloatArray = SPEEDS) -> tuple[Finding, ...]:
     generator = np.random.default_rng(seed)
     evidence = synthetic_map(speeds, SPREAD, generator)
     seen = _seen(len(evidence.runs) + len(evidence.starts), generator)
     evidence = _changed(evidence, change(_sign(evidence), seen))
-    return residual_findings(evidence, settle(evidence, EACH), seen, axis)  # type: ignore[arg-type]
+    return residual_findings(evidence, settle(evidence, EACH), seen, "rotary")
 
 
 def _sign(evidence: Evidence) -> FloatArray:
@@ -67,10 +65,6 @@ def _creeping_zero(sign: FloatArray, seen: Circumstances) -> FloatArray:
     return np.asarray(0.02 * sign * (seen.time / seen.time.max() - 0.5))
 
 
-def _gravity(sign: FloatArray, seen: Circumstances) -> FloatArray:
-    return np.asarray(0.01 * sign * seen.sine)
-
-
 def test_clean_maps_raise_nothing() -> None:
     assert sum(bool(_findings(_nothing, seed)) for seed in range(8)) <= 1  # a hundredth each, by design
 
@@ -80,7 +74,6 @@ def test_clean_maps_raise_nothing() -> None:
     [
         (_warming, "E-DRIFT", "friction changes by"),
         (_creeping_zero, "E-DRIFT", "an offset of the torque changes by +0.0"),
-        (_gravity, "E-POSITION", "gravity"),
     ],
 )
 def test_what_is_injected_is_named(change: Change, code: str, said: str) -> None:
@@ -93,10 +86,6 @@ def test_the_size_of_a_drift_is_stated() -> None:
     (found,) = _findings(_warming, 1)
     percent = float(found.text.split("changes by ")[1].split(" %")[0])
     assert percent == pytest.approx(-100 * 0.02 / 0.5, rel=0.35)
-
-
-def test_gravity_is_no_word_for_a_linear_axis() -> None:
-    assert "E-POSITION" not in {found.code for found in _findings(_gravity, 1, axis="linear")}
 
 
 def test_drift_is_not_told_where_speeds_were_run_in_order_and_the_law_imitates_it() -> None:
