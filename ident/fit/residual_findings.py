@@ -44,6 +44,7 @@ WAVES = 6  # slow ones over the ranks of the speeds
 SAME_SPEED = 0.02  # relative difference of speeds that are replicates
 LEAST_REPLICATES = 3  # degrees of freedom within speeds
 SPEED_SHARE = 0.3  # of the torque's error
+FELT = 0.003  # of the typical torque: what corrected ripple leaves behind is no gravity
 TURN = 0.1  # by which a wave's number of cycles a turn may differ from one to be gravity
 
 
@@ -147,6 +148,8 @@ def _gravity(waves: Sequence[Wave], weighted: Weighted, seen: Circumstances) -> 
     if found is None or found.chance >= CHANCE:
         return []
     amplitude = float(np.hypot(*found.coefficients))
+    if amplitude < FELT * float(np.median(measured(weighted.data))):
+        return []
     text = (
         f"the torque varies with sin q and cos q, with an amplitude of {amplitude:.3g} N m from run to run "
         f"(p = {found.chance:.1g}), as an unbalanced link under gravity does: it is in F_c and F_s of runs "
