@@ -22,6 +22,8 @@ IndexArray = NDArray[np.intp]
 GAP: Final = 3.0  # median steps
 HOLE: Final = 0.6  # of its share of median steps that a late sample needs between its neighbours
 GOES_ON: Final = 0.5  # median steps by which stamps on both sides of a wrong one may miss their distance
+DRIFT: Final = 5e-4  # of the time by which two clocks drift apart: more than a network slews them by
+DRIFTED: Final = 5.0  # times the jitter between two clocks, that their drift over a run has to be
 STILL: Final = 1e-6  # median steps: rounding lets a clock that stands still advance by as little
 BETWEEN: Final = 10.0  # median steps put between two parts of a run: a gap to everyone who looks for one
 _SHOWN_GAPS: Final = 5
@@ -179,3 +181,34 @@ def _advance(seconds: FloatArray, median: float) -> tuple[int, int]:
         return seconds.size, int(behind.size)
     first = int(np.argmin(fills))
     return int(behind[first]), first
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How two clocks that stamped the same samples run apart."""
+
+    rate: float  # of the second against the first, per second of the first [-]
+    total: float  # over the run [s]
+
+
+def drift(first: FloatArray, second: FloatArray) -> Drift | None:
+    """How the second of two clocks (n,) [s] drifts from the first; None where it is not clear of its jitter.
+
+    Delays between the two jitter, in one direction mostly: the medians of the first and the last fifth of
+    the run are compared.
+    """
+    fifth = first.size // 5
+    duration = float(first[-1] - first[0]) if first.size else 0.0
+    if fifth < 2 or duration <= 0.0:
+        return None
+    ahead = second - first
+    begin, end = slice(0, fifth), slice(first.size - fifth, None)
+    apart = float(np.median(first[end]) - np.median(first[begin]))
+    if apart <= 0.0:
+        return None
+    rate = float(np.median(ahead[end]) - np.median(ahead[begin])) / apart
+    left = ahead - rate * first
+    jitter = 1.4826 * float(np.median(np.abs(left - np.median(left))))
+    period = float(np.median(np.diff(first)))
+    clear = abs(rate) * duration > DRIFTED * max(jitter, period)
+    return Drift(rate, rate * duration) if abs(rate) > DRIFT and clear else None

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from data.alignment import align
 from data.began import began
+from data.clocks import drift
 from data.csv.description import TIME_NAMES
 from data.csv.dialect import bare, sniff
 from data.csv.log import elapsed, find_column, read_csv, table_integrity
@@ -358,7 +359,7 @@ def _clock(door: _Door, topic: Topic) -> tuple[NDArray[np.int64], str, tuple[Fin
         return topic.publish_time, "publish times", ()
     header = topic.header_time
     if header is not None and (asked == "header" or np.any(header != header[0]) or header.size < 2):
-        return header, "header stamps", ()
+        return header, "header stamps", _drifting(door, header, topic.log_time)
     if asked == "header":
         raise LogError(f'{door.log}: the messages carry no header stamp; set clock = "log" in [signals]')
     if header is None:
@@ -368,6 +369,23 @@ def _clock(door: _Door, topic: Topic) -> tuple[NDArray[np.int64], str, tuple[Fin
         'recorder\'s jitter. Set clock = "log" in [signals] to say so'
     )
     return topic.log_time, "log times", (Finding("E-CLOCK", Severity.WARN, text, door.log),)
+
+
+def _drifting(door: _Door, header: NDArray[np.int64], log: NDArray[np.int64]) -> tuple[Finding, ...]:
+    """What is said of header stamps [ns] that run faster or slower than the log's times [ns]."""
+    lead = max(unset_lead(header / 1e9), unset_lead(log / 1e9))
+    if header.size <= lead:
+        return ()
+    found = drift((header[lead:] - header[lead]) / 1e9, (log[lead:] - log[lead]) / 1e9)
+    if found is None:
+        return ()
+    text = (
+        f"the log times drift from the header stamps, which are the clock, by {found.total:.4g} s over the "
+        f"run, {100 * found.rate:.3g} %: one of the two clocks runs wrong, and every speed, b and the "
+        "inertia by as much if it is the header's. Set `clock = \"log\"` in [signals] if the recorder's is "
+        "better"
+    )
+    return (Finding("E-CLOCK", Severity.WARN, text, door.log),)
 
 
 def _on_clock(

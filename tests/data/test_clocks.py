@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from data.clocks import advancing, clock_report, clock_report_ns
+from data.clocks import advancing, clock_report, clock_report_ns, drift
 
 
 def test_rate_jitter_gaps_and_stalls() -> None:
@@ -93,3 +93,19 @@ def test_any_stamps_come_out_advancing(stamps: list[float], fewest: int) -> None
     assert found.kept.size + found.wrong + found.short == len(stamps)
     edges = np.diff([0, *found.breaks, found.kept.size])
     assert found.first is None or not found.kept.size or edges.min() >= fewest
+
+
+@settings(max_examples=100, deadline=None)
+@given(rate=st.floats(1e-3, 0.2), slower=st.booleans(), seed=st.integers(0, 99))
+def test_clocks_that_drift_apart_are_told_and_those_that_jitter_are_not(
+    rate: float, slower: bool, seed: int
+) -> None:
+    rate = -rate if slower else rate
+    time = np.arange(20_000, dtype=np.float64) * 1e-3
+    late = np.random.default_rng(seed).exponential(5e-4, 20_000)
+    assert drift(time, time + late) is None
+    assert drift(time, (1.0 + 5e-5) * time + late) is None
+    found = drift(time, (1.0 + rate) * time + late)
+    assert found is not None
+    assert found.rate == pytest.approx(rate, abs=1e-4)
+    assert found.total == pytest.approx(20.0 * rate, rel=0.1)

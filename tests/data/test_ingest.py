@@ -237,6 +237,26 @@ def test_a_clock_that_jumps_back_splits_the_run(tmp_path: Path) -> None:
     assert np.array_equal(np.concatenate((first.position, second.position)), got.position)
 
 
+@pytest.mark.parametrize("rate", [0.0, 0.01])
+def test_stamps_that_drift_from_the_log_s_times_are_told(tmp_path: Path, rate: float) -> None:
+    path = tmp_path / "run.mcap"
+    messages = []
+    for k in range(2000):
+        stamp, logged = 1_000_000_000 + k * 1_000_000, 1_000_000_000 + round(k * 1e6 * (1 + rate))
+        sec, nanosec = divmod(stamp, 10**9)
+        data = {
+            "header": {"stamp": {"sec": sec, "nanosec": nanosec}},
+            "position": [1e-3 * k],
+            "effort": [0.1],
+        }
+        messages.append(hostile.message(1, logged, json.dumps(data).encode()))
+    channel = hostile.channel(1, 0, "/joint_states", "json")
+    path.write_bytes(hostile.file(channel, *messages))
+    found = read(path).findings
+    assert [(f.code, f.severity) for f in found] == [("E-CLOCK", Severity.WARN)] * bool(rate)
+    assert all("by 0.01999 s over the run, 1 %" in f.text for f in found)
+
+
 def test_damage_is_told_before_what_it_leaves_missing(tmp_path: Path) -> None:
     content = write(tmp_path / "run.mcap").read_bytes()
     flipped = bytearray(content)
