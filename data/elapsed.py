@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 FINE: Final = 1e-9  # of a step between samples: rounding below it is none
 _WIDEST: Final = 19  # digits that fit 64 bits, if the first is no 9
-_EPOCH: Final = 1e8  # [s] three years: a clock beyond it counts from a date, not from a start
+EPOCH: Final = 1e8  # [s] three years: a clock beyond it counts from a date, not from a start
 
 
 def since_first(ticks: Sequence[Decimal]) -> FloatArray:
@@ -72,4 +72,4 @@ def unset_lead(seconds: FloatArray) -> int:
     if not seconds.size or seconds[0] != 0.0 or not np.any(seconds):
         return 0
     lead = int(np.argmax(seconds != 0.0))
-    return lead if seconds[lead] > _EPOCH else 0
+    return lead if seconds[lead] > EPOCH else 0

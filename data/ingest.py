@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data.alignment import align
+from data.began import began
 from data.clocks import drift
 from data.csv.description import TIME_NAMES
 from data.csv.dialect import bare, sniff
@@ -50,6 +51,7 @@ class _Logged:
     clock: str
     metadata: Mapping[str, str]
     findings: tuple[Finding, ...]
+    begun: float | None  # from 1970 [s]
 
 
 @dataclass(frozen=True)
@@ -140,6 +142,7 @@ def read_recording(
     )
     return replace(
         recording,
+        begun=logged.begun,
         simulated=logged.metadata.get("simulated", "").strip().lower() == "true",
         sha256=hashlib.sha256(content.data).hexdigest(),
         metadata=logged.metadata,
@@ -249,7 +252,8 @@ def _read_csv(door: _Door, content: ByteArray) -> _Logged:
     findings = integrity.require(door.log, salvage=door.salvage)
     name = layout.headers[columns["time"]] if layout.headers else str(columns["time"])
     clock = f"column {shown(name)!r}"
-    lead = unset_lead(door.convert("time", _interval(time), values.pop("time")))
+    stamps = door.convert("time", _interval(time), values.pop("time"))
+    lead = unset_lead(stamps)
     return _Logged(
         time=door.convert("time", _interval(time), elapsed(table, columns["time"], begin=lead)),
         signals={
@@ -258,6 +262,7 @@ def _read_csv(door: _Door, content: ByteArray) -> _Logged:
         clock=clock,
         metadata=layout.metadata,
         findings=(*findings, *_unset(door, lead, clock)),
+        begun=began(float(stamps[lead]) if stamps.size > lead else 0.0, layout.metadata),
     )
 
 
@@ -340,7 +345,8 @@ def _read_mcap(door: _Door, content: ByteArray) -> _Logged:
         seconds = door.convert("time", time, since_first(topic.ticks[lead:]))
     findings += _unset(door, lead, name)
     signals = {quantity: values[lead:] for quantity, values in signals.items()}
-    logged = _Logged(seconds, signals, name, read.metadata, tuple(findings))
+    begun = began(float(clock[lead]) / 1e9, read.metadata)
+    logged = _Logged(seconds, signals, name, read.metadata, tuple(findings), begun)
     return _after_first(logged)
 
 
@@ -375,8 +381,8 @@ def _drifting(door: _Door, header: NDArray[np.int64], log: NDArray[np.int64]) ->
         return ()
     text = (
         f"the log times drift from the header stamps, which are the clock, by {found.total:.4g} s over the "
-        f"run, {100 * found.rate:.3g} %: one of the two clocks runs wrong, and every speed, b and the inertia "
-        "by as much if it is the header's. Set `clock = \"log\"` in [signals] if the recorder's clock is the better"
+        f"run, {100 * found.rate:.3g} %: one of the two clocks runs wrong, and if it is the header's, so are "
+        "all speeds, b and the inertia. Set `clock = 'log'` in [signals] if the recorder's clock is the better"
     )
     return (Finding("E-CLOCK", Severity.WARN, text, door.log),)
 

@@ -36,6 +36,7 @@ class Recording:
     resolution: float | None = None  # one encoder count [rad]; None: unknown
     torque_limit: float | None = None  # [N m]
     axis: Axis = "rotary"
+    begun: float | None = None  # when the log's clock starts, from 1970 [s]; None: it does not say
     simulated: bool = False  # written by a virtual rig
     sha256: str = ""
     metadata: Mapping[str, str] = field(default_factory=lambda: _NOTHING)

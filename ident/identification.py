@@ -32,10 +32,12 @@ from ident.excitation.excited_law import excited_law
 from ident.excitation.inverse_dynamics import Law
 from ident.fit.assumptions import DEFAULT, Assumptions
 from ident.fit.breakaway_summary import breakaway_summaries
+from ident.fit.circumstances import circumstances
 from ident.fit.cross_check import bootstrap_table
 from ident.fit.law_model import DIRECTIONS, SIGN
 from ident.fit.map_points import friction_map
 from ident.fit.one_stage import explain
+from ident.fit.residual_findings import residual_findings
 from ident.from_excitation import from_excitation, with_excitation
 from ident.identified import Identification
 from ident.validation.summary import validate
@@ -86,6 +88,12 @@ def _from_evidence(
         *ripple_findings(evidence.waves, axis),
         *_missing_tests(evidence),
         *explained.findings,
+        *residual_findings(
+            explained.evidence,
+            explained.weighted,
+            circumstances(recordings, explained.evidence),
+            axis,
+        ),
     ]
     robot = IdentifiedRobot(
         inertia=values.inertia,

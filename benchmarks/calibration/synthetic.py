@@ -8,7 +8,11 @@ description speaks of, and no others:
   position in counts;
 - a breakaway's torque has the error of its ramp's line and a difference from place to place, and is read when
   the link has moved by counts, by which time the ramp has risen (`ident.response.breakaway_delay`);
+- the motion after a breakaway is that of the robot under the ramp, at a place where all of the friction is
+  off by as much as F_s is, with speeds that err as a smoothed encoder's do and a torque with white noise;
 - the inertia has an error whose size is itself an estimate with few degrees of freedom.
+
+The designs that are held to targets have no motion: with it there are more ways to v_s.
 
 Every other rig is the published one, give or take a tenth; the rest are unlike it in torque, speed and
 inertia.
@@ -16,9 +20,10 @@ inertia.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
@@ -29,10 +34,11 @@ from ident.evidence.frequency_response import FrequencyInertia, ResponseFit
 from ident.evidence.friction_map import LEAST_COUNTS, SteadyRun
 from ident.evidence.gathering import Evidence
 from ident.evidence.hunting import Swing
+from ident.evidence.momentum import NODES, WINDOWS, Momentum
 from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.published import INERTIA, NEGATIVE, POSITIVE
 from ident.model.robot import OneLinkRobot
-from ident.response import breakaway_delay
+from ident.response import breakaway_delay, respond
 
 Rig = Literal["published", "unlike"]
 Errors = Callable[[np.random.Generator, int], FloatArray]  # n draws of variance 1
@@ -43,6 +49,9 @@ DURATION: Final = 10.0  # [s] of a steady run at least
 LEAST_TRAVEL: Final = 0.1  # [rad] of one: slow runs last longer
 LONGEST: Final = 30.0  # [s]
 ONSET_COUNTS: Final = 3.5
+NEAR: Final = 1e-3  # [rad] from which the motion after a breakaway is used
+FAR: Final = 1.5  # [rad] up to which
+SPEED_WINDOWS: Final = 40.0  # of a motion, over one of which a speed is read
 RESPONSE_ERROR: Final = 2e-3  # of J
 RESPONSE_DOF: Final = 3
 GUESS: Final = 0.15  # by which the experimenter's v_s is off
@@ -74,6 +83,8 @@ class Design:
     counts: int = 2**18  # of the encoder, a revolution
     free_beta: bool = False
     errors: Errors = gaussian
+    motion: bool = False  # after breakaway
+    response: bool = True  # a frequency response
 
 
 def _in_ratio(n: int) -> FloatArray:
@@ -92,6 +103,9 @@ DESIGNS: Final = (
 ADVERSARIES: Final = (
     Design("heavy-tails", _in_ratio(30), errors=heavy_tailed),
     Design("skewed", _in_ratio(30), errors=skewed),
+    Design("motion", _in_ratio(30), motion=True),
+    Design("motion-alone", _in_ratio(30), motion=True, response=False),
+    Design("motion-for-low-speeds", np.linspace(20.0 * SPAN[0], SPAN[1], 30), motion=True),
 )
 
 
@@ -112,6 +126,7 @@ def campaign(design: Design, generator: np.random.Generator) -> Campaign:
     place = spread * math.exp(generator.uniform(0.0, math.log(3.0)))
     runs: list[SteadyRun] = []
     starts: list[Breakaway] = []
+    momenta: list[Momentum] = []
     for sign, curve, noise in zip((1, -1), _curves(robot), design.noise, strict=True):
         expected = _expected_velocity(robot) * math.exp(GUESS * generator.standard_normal())
         own = noise * spread * curve.coulomb_torque * design.errors(generator, design.speeds.size)
@@ -120,9 +135,15 @@ def campaign(design: Design, generator: np.random.Generator) -> Campaign:
             for speed, error in zip(expected * design.speeds, own, strict=True)
         ]
         own = noise * place * curve.coulomb_torque * design.errors(generator, design.starts)
-        starts += [_start(robot, sign, float(error), resolution, generator) for error in own]
-    response = _response(robot, generator)
-    return Campaign(robot, Evidence(tuple(runs), tuple(starts), (), response, {}))
+        begun = [_start(robot, sign, float(error), resolution, generator) for error in own]
+        starts += begun
+        if design.motion:
+            momenta += [
+                _motion(robot, start, float(error), resolution, generator)
+                for start, error in zip(begun, own, strict=True)
+            ]
+    response = _response(robot, generator) if design.response else None
+    return Campaign(robot, Evidence(tuple(runs), tuple(starts), tuple(momenta), response, {}))
 
 
 def _robot(rig: Rig, free_beta: bool, generator: np.random.Generator) -> OneLinkRobot:
@@ -240,6 +261,42 @@ def _start(
         onset=1000,
         end=1001,
         end_time=1.001,
+    )
+
+
+def _motion(
+    robot: OneLinkRobot, start: Breakaway, error: float, resolution: float, generator: np.random.Generator
+) -> Momentum:
+    """The motion under the ramp at a place where the friction is off by an `error` [N m]."""
+    curve = _curves(robot)[0 if start.direction > 0 else 1]
+    there = replace(
+        curve, static_torque=curve.static_torque + error, coulomb_torque=curve.coulomb_torque + error
+    )
+    samples = math.ceil(2.0 * math.sqrt(2.0 * FAR * robot.inertia / curve.stribeck_torque) / PERIOD)
+    time = PERIOD * np.arange(samples, dtype=np.float64)
+    torque = np.asarray(there.static_torque + abs(start.line.rate) * time)
+    moving = OneLinkRobot(robot.inertia, StribeckFriction.symmetric(there))
+    position, speed = respond(moving, start=(0.0, 0.0), torque=torque, period=PERIOD)
+    first, past = (int(np.searchsorted(position, far)) for far in (NEAR, FAR))
+    edges = np.linspace(first, min(past, samples), WINDOWS + 1).astype(int)
+    white, width = 0.02 * curve.coulomb_torque, PERIOD * (edges[-1] - first) / SPEED_WINDOWS
+    speed_error = resolution / width
+    windows = np.diff(np.eye(edges.size), axis=0)
+    duration = PERIOD * np.diff(edges)
+    variance = duration * PERIOD * white**2
+    impulse = np.diff(np.concatenate([[0.0], np.cumsum(torque)])[edges]) * PERIOD
+    nodes = np.array([np.linspace(a, b, NODES) for a, b in itertools.pairwise(edges)])
+    return Momentum(
+        log="ramps",
+        direction=start.direction,
+        impulse=impulse + np.sqrt(variance) * generator.standard_normal(WINDOWS),
+        duration=duration,
+        travel=np.diff(position[edges]),
+        gain=np.diff(speed[edges] + speed_error * generator.standard_normal(edges.size)),
+        nodes=np.interp(nodes, np.arange(samples + 1), speed),
+        places=np.zeros_like(nodes),
+        speed_covariance=speed_error**2 * windows @ windows.T,
+        impulse_variance=variance,
     )
 
 

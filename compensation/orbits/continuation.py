@@ -195,11 +195,22 @@ def _step(
         return after
     if float(after.tangent @ before.tangent) < SHARPEST:
         return Lost("the curve turns too sharply")
+    if _turns_back(scaled, before, after):
+        return Lost("the curve turns back without a fold")
     if _leaps(scaled, before, after):
         return Lost("the solution found does not continue the curve")
     if np.any(np.abs(after.companions - before.companions) > STRANGE * before.companions):
         return Lost("the solution found is another one")
     return after
+
+
+def _turns_back(scaled: Scaled, before: CurvePoint, after: CurvePoint) -> bool:
+    """Whether p turns, but neither at a fold nor at a branch point: F_p is large, and the step too long."""
+    turns = before.tangent[-1] * after.tangent[-1] < 0.0
+    if not turns or before.signs["fold"] * after.signs["fold"] <= 0.0:
+        return False
+    at = _located(scaled, before, after, partial(_watched, "branch point"))
+    return at.rank > CROSSED * max(before.rank, after.rank)
 
 
 def _leaps(scaled: Scaled, before: CurvePoint, after: CurvePoint) -> bool:

@@ -26,6 +26,7 @@ from ident.fit.friction_fit import polished
 from ident.fit.law_model import DIRECTIONS, Direction, LawModel, LawName
 from ident.fit.law_shape import chosen_shape, shape_findings
 from ident.fit.missing_direction import Missing, missing_directions, of_directions
+from ident.fit.one_law import one_law_findings
 from ident.fit.parameters import UNITS, Parameters, parameters
 from ident.fit.ramp_rates import trend_finding
 from ident.fit.second_minimum import minimum_findings, without_disputed
@@ -82,6 +83,7 @@ def explain(evidence: Evidence, *, axis: Axis, assumptions: Assumptions) -> Expl
     values = with_bounds(without_disputed(values), evidence)
     findings += shape_findings(weighted) if assumptions.shape == "fixed" else []
     findings += [] if choice is None else [choice.finding]
+    findings += one_law_findings(evidence, model)
     if weighted.data.trend is not None:
         findings.append(trend_finding(weighted.data.trend, unit=UNITS[axis]["static_torque"]))
     findings += [*values.findings, *minimum_findings(values), *_offset_finding(values, axis)]

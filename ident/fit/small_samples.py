@@ -13,7 +13,7 @@ degrees of freedom as a chi-square that strays as much (Satterthwaite 1946): wit
 
 And since the weights follow the noise that made them, the parameters stray by more than C says:
 
-    C_A = C + 2 C [ sum over g, h of W_gh (J' F_g F_h J - J' F_g J C J' F_h J) ] C,    F_g = diag(f_g).
+    C_A = C + 2 C [ sum over g, h of W_gh J' F_g R F_h J ] C,    F_g = diag(f_g).
 
 An interval then reaches t(nu) standard errors of C_A. What data know of themselves (white noise, rounding)
 has no share in this, and nu is infinite where nothing else matters. Two errors come with degrees of freedom
@@ -99,10 +99,10 @@ def certainty_of(slopes: FloatArray, plain: FloatArray, shares: FloatArray, dof:
     information[known, known] = 0.5 * dof[known]
     told, ways = np.linalg.eigh(information)
     strays = (ways / np.maximum(told, LEAST)) @ ways.T
-    felt_by = np.einsum("ip,gi,iq->gpq", slopes, shares, slopes)  # J' F_g J
-    squared = np.einsum("ip,gi,gh,hi,iq->pq", slopes, shares, strays, shares, slopes, optimize=True)
-    crossed = np.einsum("gh,gpq,qr,hrs->ps", strays, felt_by, plain, felt_by, optimize=True)
-    covariance = plain + 2.0 * plain @ (squared - crossed) @ plain
+    weighed = shares[:, :, None] * slopes  # F_g J
+    felt_by = np.einsum("ip,giq->gpq", slopes, weighed)  # J' F_g J
+    excess = np.einsum("gip,gh,hiq->pq", weighed, strays, left @ weighed, optimize=True)
+    covariance = plain + 2.0 * plain @ excess @ plain
     part = np.moveaxis(plain @ felt_by @ plain, 0, -1)
     return Certainty(plain, np.asarray(covariance), part, np.asarray(strays))
 

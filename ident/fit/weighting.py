@@ -196,7 +196,7 @@ def _own_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatA
     runs = evidence.used_runs
     speed = np.array([run.velocity_stderr for run in runs])
     place = np.array([run.place_stderr for run in runs])
-    return np.asarray(white_variance(runs) + place**2 + (_slopes(data, fit) * speed) ** 2)
+    return np.asarray(white_variance(runs) + place**2 + (law_slopes(data, fit) * speed) ** 2)
 
 
 def _start_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatArray:
@@ -238,7 +238,7 @@ def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: Spre
     )
 
 
-def _slopes(data: FitData, fit: FrictionFit) -> FloatArray:
+def law_slopes(data: FitData, fit: FrictionFit) -> FloatArray:
     """The law's slope at each run (n,) [N m s/rad]."""
     slope = np.zeros_like(data.torque)
     for direction in data.model.directions:

@@ -9,27 +9,27 @@ steady runs and breakaways where there are few logs.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from data.protocols import ProtocolName
-from data.recording import FloatArray, Recording
+from data.recording import Recording
 from ident.evidence.breakaway import Breakaway
 from ident.evidence.friction_map import SteadyRun
 from ident.evidence.gathering import Evidence
 from ident.fit.confidence import quantile
 from ident.fit.fit_data import FitData
-from ident.fit.friction_fit import FrictionFit, fit_friction, friction_torque, law_of
+from ident.fit.friction_fit import FrictionFit, fit_friction
 from ident.fit.law_model import DIRECTIONS, SIGN
+from ident.fit.predictions import gradient, measured, predicted, stderr
 from ident.fit.residual_tests import ResidualTest, rank_test, runs_test
 from ident.fit.weighting import Weighted
 
 FOLDS = 10
 LEAST_RUNS = 3  # that each direction keeps
-STEP = 1e-6  # of a derivative, in parts
 
 
 @dataclass(frozen=True)
@@ -169,29 +169,24 @@ def _predicted(
 ) -> dict[int, HeldOut]:
     """The data of those numbers against a fit that has not seen them."""
     by_name = {recording.log: recording for recording in recordings}
-    measured = np.concatenate([data.torque, data.start_torque])[which]
-    own = np.concatenate([data.run_stderr, data.start_stderr])[which]
-    predicted = _law_torque(data, fit.values, which)
-    gradient = _gradient(data, fit, which)
+    torque, said = measured(data), predicted(data, fit.values)
     felt = np.isfinite(np.diag(fit.covariance))
-    gradient = gradient[:, felt]
-    spread = np.einsum("nj,jk,nk->n", gradient, fit.covariance[np.ix_(felt, felt)], gradient)
+    slope, covariance = gradient(data, fit)[:, felt], fit.covariance[np.ix_(felt, felt)]
+    variance = stderr(data) ** 2 + np.einsum("nj,jk,nk->n", slope, covariance, slope)
     found = {}
-    for place, number in enumerate(which):
-        item = items[int(number)]
-        sign = item.direction
-        motion = 0.0
-        if isinstance(item, SteadyRun):
-            motion = fit.values["inertia"] * float(data.acceleration[number])
-        found[int(number)] = HeldOut(
+    for number in map(int, which):
+        item = items[number]
+        steady = isinstance(item, SteadyRun)
+        driven = fit.values["inertia"] * float(data.acceleration[number]) if steady else 0.0
+        found[number] = HeldOut(
             log=item.log,
-            protocol="constant_velocity" if isinstance(item, SteadyRun) else "breakaway",
-            direction=sign,
+            protocol="constant_velocity" if steady else "breakaway",
+            direction=item.direction,
             velocity=item.velocity if isinstance(item, SteadyRun) else 0.0,
             place=_place(by_name[item.log], item),
-            measured=sign * (float(measured[place]) - motion),
-            predicted=sign * (float(predicted[place]) - motion),
-            stderr=float(np.sqrt(own[place] ** 2 + max(spread[place], 0.0))),
+            measured=item.direction * (float(torque[number]) - driven),
+            predicted=item.direction * (float(said[number]) - driven),
+            stderr=float(variance[number]) ** 0.5,
         )
     return found
 
@@ -200,32 +195,6 @@ def _place(recording: Recording, item: SteadyRun | Breakaway) -> float:
     if isinstance(item, Breakaway):
         return item.place
     return float(np.interp(0.5 * (item.start_time + item.end_time), recording.time, recording.position))
-
-
-def _law_torque(data: FitData, values: Mapping[str, float], which: NDArray[np.int64]) -> FloatArray:
-    """What the law says of the data of those numbers (k,) [N m], magnitudes along the motion."""
-    direction = np.concatenate([data.run_direction, data.start_direction])[which]
-    speed = np.concatenate([data.speed, np.zeros(data.start_torque.size)])[which]
-    acceleration = np.concatenate([data.acceleration, np.zeros(data.start_torque.size)])[which]
-    torque = values["inertia"] * acceleration
-    for name in DIRECTIONS:
-        own = direction == SIGN[name]
-        if np.any(own):
-            torque[own] += friction_torque(law_of(values, name), speed[own])
-    return np.asarray(torque)
-
-
-def _gradient(data: FitData, fit: FrictionFit, which: NDArray[np.int64]) -> FloatArray:
-    """Derivatives of the predictions by the free parameters (k, p)."""
-    columns = []
-    largest = max(abs(value) for value in fit.values.values())
-    for name in fit.free:
-        step = STEP * max(abs(fit.values[name]), STEP * largest)
-        ahead, behind = (
-            _law_torque(data, {**fit.values, name: fit.values[name] + off}, which) for off in (step, -step)
-        )
-        columns.append((ahead - behind) / (2 * step))
-    return np.column_stack(columns)
 
 
 def _tests(points: Sequence[HeldOut]) -> tuple[ResidualTest, ...]:

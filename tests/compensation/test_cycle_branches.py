@@ -237,6 +237,25 @@ def test_a_fold_of_cycles_has_an_unstable_side() -> None:
     assert beyond.amplitude > 0.3  # only the large cycle is left
 
 
+def test_a_branch_does_not_turn_back_without_a_fold() -> None:
+    """Near a graze F_p is so large that a step across a knot of folds seemed to turn, and went back."""
+
+    def shaped(robot: OneLinkRobot) -> OneLinkRobot:
+        curves = (robot.friction.positive, robot.friction.negative)
+        return replace(robot, friction=StribeckFriction(*(replace(c, stribeck_shape=2.0) for c in curves)))
+
+    controller = Controller(Gains(0.4, 0.02, observer=73.5, compensation=1.05), shaped(symmetric_robot()))
+    case = ClosedLoop(shaped(asymmetric_robot()), controller)
+    cycle = find_cycle(LoopSection(case), np.array([0.3, 0.0]))
+    assert isinstance(cycle, Cycle)
+    branch = cycle_branch(case, "n1", (0.05, 1.5), cycle)
+    assert branch.points[0].value == 0.05
+    assert branch.points[-1].value == pytest.approx(1.13173, abs=1e-6)
+    folds = [event.value for event in branch.events if event.kind == "fold of cycles"]
+    assert folds[0] == pytest.approx(1.13172998740, abs=1e-10)
+    assert max(point.value for point in branch.points) <= folds[0]
+
+
 @pytest.mark.parametrize(
     ("gain", "span", "said"),
     [

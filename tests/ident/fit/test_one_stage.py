@@ -73,6 +73,31 @@ def test_one_law_stands_in_the_mean_with_its_offset() -> None:
     assert "E-OFFSET" not in {finding.code for finding in second.findings}
 
 
+def test_one_law_that_does_not_hold_both_ways_is_told() -> None:
+    evidence = synthetic_map(SPEEDS, 2e-3, np.random.default_rng(2))
+    asymmetric = _explained(evidence, laws="one")
+    assert any("Identify without --one-law" in finding.text for finding in asymmetric.findings)
+    back = ROBOT.friction.negative
+    mirrored = [
+        replace(
+            run,
+            torque=-float(ROBOT.friction.positive.total(-run.velocity))
+            + run.torque
+            + float(back.total(-run.velocity)),
+        )
+        if run.velocity < 0
+        else run
+        for run in evidence.runs
+    ]
+    more = ROBOT.friction.positive.static_torque - back.static_torque
+    starts = [
+        replace(s, line=replace(s.line, torque=s.line.torque - more)) if s.direction < 0 else s
+        for s in evidence.starts
+    ]
+    symmetric = _explained(replace(evidence, runs=tuple(mirrored), starts=tuple(starts)), laws="one")
+    assert "E-LACKOFFIT" not in _codes(symmetric)
+
+
 def test_one_law_of_one_direction_has_no_offset() -> None:
     evidence = synthetic_map(SPEEDS, 2e-3, np.random.default_rng(3))
     found = _explained(replace(evidence, runs=tuple(r for r in evidence.runs if r.velocity < 0)), laws="one")

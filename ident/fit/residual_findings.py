@@ -1,0 +1,245 @@
+r"""What the residuals of the settled fit betray: drift, gravity, errors of speed, a law that does not fit.
+
+A cause that the law leaves out is tested as a column that is added to it. With e the residuals in standard
+errors and A the derivatives of the law's predictions in the same, the column x is seen only so far as the law
+cannot imitate it, x - A (A^+ x); its size and its F ratio follow by least squares (the test of an added
+variable; Cook and Weisberg 1982, sec. 2.4.4). So a drift over speeds that were run in order is not called
+certain where it may as well be damping. The scatter is that of the residuals, not of the weights.
+
+- E-DRIFT: friction that grows or falls with time, in parts of itself, or an offset of the torque that does.
+- E-POSITION: a torque with sin q and cos q, as gravity makes it; ripple is found within the runs
+  (`ident.evidence.position_ripple`).
+- E-LACKOFFIT: runs at one speed that scatter less about each other than about the law; residuals that keep
+  their sign over many speeds; or that follow slow waves over the ranks of the speeds, as those of a law of
+  another shape do (a smooth test: Eubank and Hart 1992).
+- E-SPEEDERR: the error of a run's speed, times the law's slope, is a large part of its torque's. It is in the
+  weights already; what is lost is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as fisher
+from scipy.stats import rankdata
+
+from data.findings import Finding, Severity
+from data.recording import Axis, FloatArray
+from ident.evidence.gathering import Evidence
+from ident.evidence.position_ripple import Wave
+from ident.fit.circumstances import Circumstances
+from ident.fit.law_model import SIGN
+from ident.fit.parameters import UNITS
+from ident.fit.predictions import directions, gradient, measured, predicted, stderr
+from ident.fit.residual_tests import runs_test
+from ident.fit.weighting import Weighted, law_slopes
+
+CHANCE = 0.002  # of each test where nothing is wrong
+SPARE = 4  # least number of data beyond parameters and added columns
+IMITATED = 0.05  # part of the columns' mean square that the law must leave, or nothing can be said
+WAVES = 6  # slow ones over the ranks of the speeds
+SAME_SPEED = 0.02  # relative difference of speeds that are replicates
+LEAST_REPLICATES = 3  # degrees of freedom within speeds
+SPEED_SHARE = 0.3  # of the torque's error
+FELT = 0.003  # of the typical torque: what corrected ripple leaves behind is no gravity
+TURN = 0.1  # by which a wave's number of cycles a turn may differ from one to be gravity
+
+
+@dataclass(frozen=True)
+class Added:
+    """Columns added to the law: coefficients in N m a unit of the column, and the chance of their F ratio."""
+
+    coefficients: FloatArray  # (k,) [N m / unit of the column]
+    chance: float  # p value [-]
+
+
+def residual_findings(
+    evidence: Evidence, weighted: Weighted, seen: Circumstances, axis: Axis
+) -> tuple[Finding, ...]:
+    """Everything that the residuals betray."""
+    found = [
+        *_drift(weighted, seen, axis),
+        *(_gravity(evidence.waves, weighted, seen) if axis == "rotary" else []),
+        *_replicates(weighted),
+        *_bends(weighted),
+        *_speed_errors(evidence, weighted),
+    ]
+    return tuple(found)
+
+
+def added(weighted: Weighted, columns: FloatArray, groups: FloatArray | None = None) -> Added | None:
+    """The F test of columns (n + m, k) [N m] that are added to the law; None where nothing can be said.
+
+    `groups` (n + m, g) are columns that both models have.
+    """
+    error = stderr(weighted.data)
+    residual = (measured(weighted.data) - predicted(weighted.data, weighted.fit.values)) / error
+    law = gradient(weighted.data, weighted.fit)
+    if groups is not None:
+        law = np.column_stack([law, groups])
+    span = _orthonormal(law / error[:, None])
+    left = residual - span @ (span.T @ residual)
+    column = columns / error[:, None]
+    own = column - span @ (span.T @ column)
+    directions_left, sizes, turned = np.linalg.svd(own, full_matrices=False)
+    seen = sizes**2 > IMITATED * np.sum(column**2) / column.shape[1]
+    rank = int(np.count_nonzero(seen))
+    spare = residual.size - span.shape[1] - rank
+    if spare < SPARE or rank == 0:
+        return None
+    share = directions_left[:, seen].T @ left
+    rest = float(np.sum(left**2) - np.sum(share**2))
+    if rest <= 0.0:
+        return None
+    chance = float(fisher.sf(float(np.sum(share**2)) / rank / (rest / spare), rank, spare))
+    return Added(np.asarray(turned[seen].T @ (share / sizes[seen])), chance)
+
+
+def _orthonormal(columns: FloatArray) -> FloatArray:
+    """A basis (n, r) of what columns (n, p) span; columns of zeros span nothing."""
+    size = np.linalg.norm(columns, axis=0)
+    left, values, _ = np.linalg.svd(columns[:, size > 0] / size[size > 0], full_matrices=False)
+    return np.asarray(left[:, values > 1e-9 * values[0]])
+
+
+def _drift(weighted: Weighted, seen: Circumstances, axis: Axis) -> list[Finding]:
+    time, groups = np.zeros_like(seen.time), []
+    for number in np.unique(seen.group):
+        own = seen.group == number
+        time[own] = seen.time[own] - np.mean(seen.time[own])
+        groups.append(own.astype(np.float64))
+    span = float(np.ptp(time))
+    if span == 0.0:
+        return []
+    size = predicted(weighted.data, weighted.fit.values)
+    sign, unit = directions(weighted.data), UNITS[axis]["torque_offset"]
+    # The mean of one group is the law's; those of many logs are not, or drift between them would count.
+    means = np.column_stack(groups) if len(groups) > 1 else np.zeros((time.size, 0))
+    friction = added(weighted, (time / span * size)[:, None], means * size[:, None])
+    offset = added(weighted, (time / span * sign)[:, None], means * sign[:, None])
+    over = f"over {span:.3g} s of recording" if len(groups) == 1 else f"within logs, over {span:.3g} s"
+    advice = "Warm the rig up, repeat the first speed at the end, and mix the order of the speeds."
+    if friction is not None and friction.chance < CHANCE:
+        part, typical = float(friction.coefficients[0]), float(np.median(size))
+        text = (
+            f"friction changes by {100 * part:+.2g} % ({part * typical:+.2g} {unit}) {over} "
+            f"(p = {friction.chance:.1g}): the law is that of the middle of the recording, and where speeds "
+            f"were run in order the change bends b and F_c. {advice}"
+        )
+        return [Finding("E-DRIFT", Severity.WARN, text)]
+    if offset is not None and offset.chance < CHANCE:
+        text = (
+            f"an offset of the torque changes by {float(offset.coefficients[0]):+.2g} {unit} {over} "
+            f"(p = {offset.chance:.1g}): F_c and F_s of the two directions are moved against each other. "
+            f"Zero the torque sensor. {advice}"
+        )
+        return [Finding("E-DRIFT", Severity.WARN, text)]
+    return []
+
+
+def _gravity(waves: Sequence[Wave], weighted: Weighted, seen: Circumstances) -> list[Finding]:
+    if any(abs(wave.wavenumber - 1.0) < TURN for wave in waves):
+        return []
+    sign = directions(weighted.data)[:, None]
+    found = added(weighted, np.column_stack([seen.sine, seen.cosine]) * sign)
+    if found is None or found.chance >= CHANCE:
+        return []
+    amplitude = float(np.hypot(*found.coefficients))
+    if amplitude < FELT * float(np.median(measured(weighted.data))):
+        return []
+    text = (
+        f"the torque varies with sin q and cos q, with an amplitude of {amplitude:.3g} N m from run to run "
+        f"(p = {found.chance:.1g}), as an unbalanced link under gravity does: it is in F_c and F_s of runs "
+        "that do not cover whole turns. Run over whole turns, balance the link, or start all from one place."
+    )
+    return [Finding("E-POSITION", Severity.WARN, text)]
+
+
+def _replicates(weighted: Weighted) -> list[Finding]:
+    """The lack-of-fit F test (Draper and Smith 1998, sec. 2.1) on runs at equal speeds."""
+    data = weighted.data
+    runs = slice(0, data.torque.size)
+    residual = (measured(data) - predicted(data, weighted.fit.values))[runs] / data.run_stderr
+    within, degrees = 0.0, 0
+    for own in _equal_speeds(data.run_direction * data.speed):
+        weight = data.run_stderr[own] ** -2.0
+        mean = float(np.sum(residual[own] * weight**0.5) / np.sum(weight))
+        within += float(np.sum((residual[own] - mean * weight**0.5) ** 2))
+        degrees += own.size - 1
+    law = sum(name != "inertia" for name in weighted.fit.free)
+    spare = residual.size - degrees - law
+    if degrees < LEAST_REPLICATES or spare < 1 or within <= 0.0:
+        return []
+    lack = max(float(np.sum(residual**2)) - within, 0.0)
+    chance = float(fisher.sf(lack / spare / (within / degrees), spare, degrees))
+    if chance >= CHANCE:
+        return []
+    times = float(np.sqrt(lack / spare / (within / degrees)))
+    text = (
+        f"runs repeated at one speed scatter {times:.2g} times less about each other than speeds do about "
+        f"the law (F test, p = {chance:.1g}): the law does not fit, and values and intervals are conditional "
+        "on it. Try --free-beta, and look for drift and for speeds that a loop or a resonance disturbs."
+    )
+    return [Finding("E-LACKOFFIT", Severity.WARN, text)]
+
+
+def _equal_speeds(velocity: FloatArray) -> list[NDArray[np.int64]]:
+    """Indices of runs at equal signed speeds (n,), groups of at least two."""
+    order = np.argsort(velocity)
+    steps = np.diff(velocity[order]) > SAME_SPEED * np.abs(velocity[order][1:])
+    return [own for own in np.split(order, np.flatnonzero(steps) + 1) if own.size > 1]
+
+
+def _bends(weighted: Weighted) -> list[Finding]:
+    """Order of a direction's residuals over its speeds."""
+    data = weighted.data
+    residual = (data.torque - predicted(data, weighted.fit.values)[: data.torque.size]) / data.run_stderr
+    found = []
+    for direction in data.model.directions:
+        own = data.run_direction == SIGN[direction]
+        signs = runs_test(residual[own], data.speed[own], name=direction)
+        smooth = added(weighted, _slow_waves(data.speed, own, data.start_torque.size))
+        chances = [test.chance for test in (signs, smooth) if test is not None]
+        if not chances or min(chances) >= 0.5 * CHANCE:
+            continue
+        text = (
+            f"{direction} direction: over {int(own.sum())} speeds the residuals follow each other "
+            f"(p = {min(chances):.1g}), {_typical(residual[own] * data.run_stderr[own]):.2g} in size: the "
+            "law does not follow the measured curve, and values and intervals are conditional on it. Try "
+            "--free-beta; look at figure 2 for the speeds that stand off."
+        )
+        found.append(Finding("E-LACKOFFIT", Severity.WARN, text))
+    return found
+
+
+def _slow_waves(speed: FloatArray, own: NDArray[np.bool_], starts: int) -> FloatArray:
+    """cos(pi k s), k = 1 ... WAVES, s the rank of a direction's speeds from 0 to 1 (n + m, WAVES) [-]."""
+    rank = (rankdata(speed[own]) - 0.5) / max(int(own.sum()), 1)
+    columns = np.zeros((speed.size + starts, WAVES))
+    columns[: speed.size][own] = np.cos(np.pi * np.outer(rank, np.arange(1, WAVES + 1)))
+    return columns
+
+
+def _typical(residual: FloatArray) -> float:
+    return float(np.sqrt(np.mean(residual**2)))
+
+
+def _speed_errors(evidence: Evidence, weighted: Weighted) -> list[Finding]:
+    speed = np.array([run.velocity_stderr for run in evidence.used_runs])
+    from_speed = np.abs(law_slopes(weighted.data, weighted.fit)) * speed
+    rest = np.sqrt(np.maximum(weighted.data.run_stderr**2 - from_speed**2, 0.0))
+    large = from_speed > SPEED_SHARE * rest
+    if not np.any(large):
+        return []
+    worst = int(np.argmax(from_speed / np.maximum(weighted.data.run_stderr, 1e-300)))
+    run = evidence.used_runs[worst]
+    text = (
+        f"{int(large.sum())} of {large.size} runs: the error of the speed, times the slope of the law, is "
+        f"over {SPEED_SHARE:g} of the torque's other errors; most in {run.log} at {run.velocity:.3g}, with "
+        f"{from_speed[worst]:.2g} beside {rest[worst]:.2g}. These runs are given that error too, and v_s and "
+        "F_s are less well known for it. Record slow speeds for longer, or with a finer encoder."
+    )
+    return [Finding("E-SPEEDERR", Severity.WARN, text)]
