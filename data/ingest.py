@@ -382,7 +382,7 @@ def _drifting(door: _Door, header: NDArray[np.int64], log: NDArray[np.int64]) ->
     text = (
         f"the log times drift from the header stamps, which are the clock, by {found.total:.4g} s over the "
         f"run, {100 * found.rate:.3g} %: one of the two clocks runs wrong, and if it is the header's, so are "
-        "all speeds, b and the inertia. Set `clock = 'log'` in [signals] if the recorder's clock is the better"
+        "all speeds, b and the inertia. Set `clock = 'log'` in [signals] if the recorder's clock is better"
     )
     return (Finding("E-CLOCK", Severity.WARN, text, door.log),)
 

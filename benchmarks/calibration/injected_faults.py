@@ -7,6 +7,7 @@ a campaign without ramps is told that ramps are missing, whatever it was meant t
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -333,8 +334,8 @@ def drift(generator: Generator) -> Injected:
     for place, number in enumerate(order.tolist()):
         log = whole.logs[number]
         warm = 1.0 - loss * place / (order.size - 1)
-        steady = log.protocol == "constant_velocity"
-        logs.append(replace(log, torque=log.torque * warm if steady else log.torque))
+        driven = log.protocol == "frequency_response"
+        logs.append(log if driven else replace(log, torque=log.torque * warm))
     return Injected(
         Campaign(rig, tuple(logs)), (WARN,), "fit", also=("E-NOSTRIBECK", "E-LOWSPEED", "E-BOUND")
     )
@@ -414,25 +415,31 @@ def speed_error(generator: Generator) -> Injected:
             logs.append(steady_log(rig, side * speed, generator, duration=duration))
     logs += [ramp_log(rig, s * 0.45 * rig.static, generator) for s in (1.0, -1.0)]
     return Injected(
-        Campaign(rig, (*logs, *multisine_logs(rig, generator))), (WARN,), "fit", also=("E-LOWSPEED",)
+        Campaign(rig, (*logs, *multisine_logs(rig, generator))),
+        (WARN,),
+        "fit",
+        also=("E-LOWSPEED", "E-QUANT"),
     )
 
 
 def lack_of_fit(generator: Generator) -> Injected:
-    """Friction with a bump that no Stribeck law has, seen several times over."""
-    whole = clean_campaign(generator)
-    rig = whole.rig
+    """Friction with a bump that no Stribeck law has, at speeds that were each run three times."""
+    rig = random_rig(generator)
     size = generator.uniform(0.1, 0.2) * rig.coulomb
     centre = rig.velocity * generator.uniform(6.0, 12.0)
-
-    def bumped(log: Signals) -> Signals:
-        if log.protocol != "constant_velocity":
-            return log
-        speed = abs(_way(log) / (log.time[-1] - log.time[0]))
-        bump = size * math.exp(-((math.log(speed / centre) / 0.6) ** 2))
-        return replace(log, torque=log.torque + math.copysign(bump, _way(log)))
-
-    return _everywhere(whole, bumped, WARN, also=("E-BOUND", "E-LOWSPEED", "E-NOSTRIBECK"))
+    logs = []
+    for side, speed, again in itertools.product((1.0, -1.0), np.geomspace(0.2, 30.0, 8).tolist(), range(3)):
+        name = f"velocity/{side * speed:.4g}_{again}.csv"
+        log = steady_log(rig, side * speed * rig.velocity, generator, name=name)
+        bump = size * math.exp(-((math.log(speed * rig.velocity / centre) / 0.6) ** 2))
+        logs.append(replace(log, torque=log.torque + math.copysign(bump, side)))
+    logs += [ramp_log(rig, s * 0.45 * rig.static, generator) for s in (1.0, -1.0)]
+    return Injected(
+        Campaign(rig, (*logs, *multisine_logs(rig, generator))),
+        (WARN,),
+        "fit",
+        also=("E-BOUND", "E-LOWSPEED", "E-NOSTRIBECK"),
+    )
 
 
 def two_minima(generator: Generator) -> Injected:
