@@ -26,6 +26,7 @@ from benchmarks.calibration.clean_campaigns import (
     steady_log,
 )
 from data.findings import Severity
+from data.recording import FloatArray
 from data.screening import Signals
 from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
@@ -443,23 +444,41 @@ def lack_of_fit(generator: Generator) -> Injected:
 
 
 def two_minima(generator: Generator) -> Injected:
-    """Friction that falls twice as much, over 0.3 v_s and over 6 v_s: either may be the Stribeck velocity."""
-    rig = random_rig(generator)
-    speeds = rig.velocity * np.array([0.15, 0.4, 1.0, 2.5, 6.0, 15.0, 40.0])
+    """Speeds whose torques two Stribeck velocities explain equally well, with a worse fit between them."""
+    rig = replace(random_rig(generator), fine=False)
+    speeds = np.array([0.1, 0.3, 1.0, 3.0, 8.0, 20.0, 50.0])
+    torques = _ambiguous(speeds, generator)
     logs = []
-    for side in (1.0, -1.0):
-        for speed in speeds.tolist():
-            log = steady_log(replace(rig, fine=False), side * speed, generator)
-            plain = float(np.median(np.abs(log.torque)))
-            falls = math.exp(-speed / (0.3 * rig.velocity)) + math.exp(-speed / (6.0 * rig.velocity))
-            wanted = rig.coulomb * (1.0 + 0.15 * falls)
-            logs.append(replace(log, torque=log.torque + math.copysign(wanted - plain, side)))
-    return Injected(
-        Campaign(rig, (*logs, *multisine_logs(rig, generator))),
-        (WARN, WITHHOLD),
-        "fit",
-        also=("E-LOWSPEED", "E-BOUND"),
-    )
+    for side, (speed, torque) in itertools.product((1.0, -1.0), zip(speeds, torques, strict=True)):
+        log = steady_log(rig, side * float(speed) * rig.velocity, generator)
+        plain = float(np.median(np.abs(log.torque)))
+        logs.append(replace(log, torque=log.torque + side * (rig.coulomb * float(torque) - plain)))
+    campaign = Campaign(rig, (*logs, *multisine_logs(rig, generator)))
+    return Injected(campaign, (WARN, WITHHOLD), "fit", also=("E-LOWSPEED", "E-BOUND", "E-NOSTRIBECK"))
+
+
+def _ambiguous(speeds: FloatArray, generator: Generator) -> FloatArray:
+    """Torques in F_c at speeds (n,) in v_s, drawn until the best two minima over v_s are equal."""
+    grid = np.geomspace(0.05, 30.0, 60)
+    bases = [np.column_stack((np.ones_like(speeds), np.exp(-speeds / v), speeds)) for v in grid]
+    solvers = np.array([np.linalg.pinv(basis) for basis in bases])
+    while True:
+        drawn = 1.0 + 0.3 * np.exp(-speeds / 2.0) + 0.006 * speeds
+        drawn = drawn + 0.08 * generator.standard_normal((2000, speeds.size))
+        laws = np.einsum("gpn,dn->dgp", solvers, drawn)
+        misfit = np.array(
+            [np.sum((drawn - laws[:, k] @ bases[k].T) ** 2, axis=1) for k in range(grid.size)]
+        ).T
+        sound = np.all(laws > 0.0, axis=2)
+        inner = misfit[:, 1:-1]
+        lowest = (inner < misfit[:, :-2]) & (inner < misfit[:, 2:]) & sound[:, 1:-1]
+        for n in np.flatnonzero(lowest.sum(axis=1) >= 2).tolist():
+            places = np.flatnonzero(lowest[n]) + 1
+            one, two = sorted(places[np.argsort(misfit[n, places])][:2].tolist())
+            least, other = sorted((misfit[n, one], misfit[n, two]))
+            apart = grid[two] > 2.5 * grid[one] and misfit[n, one:two].max() > 1.2 * other
+            if apart and other < 1.1 * least and least < 1.01 * misfit[n][sound[n]].min():
+                return np.asarray(drawn[n])
 
 
 def missing_tests(generator: Generator) -> Injected:
