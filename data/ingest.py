@@ -381,8 +381,9 @@ def _drifting(door: _Door, header: NDArray[np.int64], log: NDArray[np.int64]) ->
         return ()
     text = (
         f"the log times drift from the header stamps, which are the clock, by {found.total:.4g} s over the "
-        f"run, {100 * found.rate:.3g} %: one of the two clocks runs wrong, and if it is the header's, so are "
-        "all speeds, b and the inertia. Set `clock = 'log'` in [signals] if the recorder's clock is better"
+        f"run, {100 * found.rate:.3g} %: one of the two clocks runs wrong, and every speed, b and the "
+        "inertia by as much if it is the header's. Set `clock = \"log\"` in [signals] if the recorder's is "
+        "better"
     )
     return (Finding("E-CLOCK", Severity.WARN, text, door.log),)
 

@@ -32,7 +32,7 @@ class FitData:
     acceleration: FloatArray  # (n,) along the motion [rad/s^2]
     run_stderr: FloatArray  # (n,) [N m]
     start_direction: NDArray[np.int64]  # (m,)
-    start_torque: FloatArray  # (m,) at the onset and at zero ramp rate [N m]
+    start_torque: FloatArray  # (m,) at the onset, at zero ramp rate, shifted by censored ones [N m]
     start_stderr: FloatArray  # (m,) [N m]
     momenta: tuple[Momentum, ...]
     whitening: tuple[FloatArray, ...]  # (k, k) for each momentum: the inverse square root of its covariance

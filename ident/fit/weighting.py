@@ -16,6 +16,7 @@ from data.recording import FloatArray
 from ident.evidence.breakaway import Breakaway
 from ident.evidence.gathering import Evidence
 from ident.evidence.momentum import Momentum
+from ident.fit.censored_mean import bounded_shift
 from ident.fit.fit_data import FitData
 from ident.fit.friction_fit import (
     FrictionFit,
@@ -223,6 +224,7 @@ def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: Spre
     if trend is not None:
         start_torque = start_torque - trend.excess
         start_stderr = start_stderr * trend.widening(data.start_direction)
+    start_torque, start_stderr = _with_bounds(evidence, data, start_torque, start_stderr)
     scale, dof = _motion_scale(data.momenta, fit, spread)
     return replace(
         data,
@@ -236,6 +238,20 @@ def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: Spre
             _whitening(motion, fit.values["inertia"], spread, scale=scale) for motion in data.momenta
         ),
     )
+
+
+def _with_bounds(
+    evidence: Evidence, data: FitData, torque: FloatArray, stderr: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Breakaways (m,) and their errors (m,) [N m] as ramps that ended at the torque limit shift them."""
+    torque, stderr = torque.copy(), stderr.copy()
+    for sign in np.unique(data.start_direction):
+        own = data.start_direction == sign
+        bounds = [abs(s.torque) for s in evidence.starts if s.is_censored and s.direction == sign]
+        shift = bounded_shift(torque[own], stderr[own], np.array(bounds))
+        torque[own] += shift.torque
+        stderr[own] *= shift.factor
+    return torque, stderr
 
 
 def law_slopes(data: FitData, fit: FrictionFit) -> FloatArray:

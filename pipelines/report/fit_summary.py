@@ -111,17 +111,32 @@ def _validation(robot: Mapping[str, Any], units: AxisUnits) -> list[str]:
             f"{test['name']}: {shown_number(test['statistic'])}, {shown_number(test['expected'])} expected; "
             f"chance alone gives as much with p = {test['chance']:.2g}"
         )
-    ramps: Sequence[Mapping[str, Any]] = validation.get("ramps") or ()
-    for motion in ramps:
-        lines += _item(
-            f"motion after breakaway, {shown(str(motion['log']), 200)} at "
-            f"{shown_number(motion['onset_time'])} s: starts {shown_number(abs(motion['onset_error']))} s "
-            f"{'later' if motion['onset_error'] > 0 else 'earlier'} than recorded; position within "
-            f"{shown_number(motion['position_rms'])} {units.position} rms "
-            f"({shown_number(motion['counts_rms'])} counts) over "
-            f"{shown_number(motion['travel'])} {units.position}"
+    return lines + _motions(validation.get("ramps") or (), units)
+
+
+def _motions(ramps: Sequence[Mapping[str, Any]], units: AxisUnits) -> list[str]:
+    """A table of the motions after breakaway."""
+    if not ramps:
+        return []
+    lines = _item(
+        "motion after breakaway, simulated by a law that had not seen its log; onset: predicted less "
+        "recorded; position: rms over the travel, from the ramp's own F_s"
+    )
+    where = units.position
+    head = ("at [s]", "onset [s]", f"travel [{where}]", f"position [{where}]", "in counts")
+    rows = [
+        (
+            shown_number(motion["onset_time"]),
+            f"{motion['onset_error']:+.4f}".replace("-", "−"),
+            shown_number(motion["direction"] * motion["travel"]),
+            f"{motion['position_rms']:.2g}",
+            f"{motion['counts_rms']:.0f}",
         )
-    return lines
+        for motion in ramps
+    ]
+    names = ("log", *(shown(str(motion["log"]), 200) for motion in ramps))
+    cells = ("".join(f"{cell:>15}" for cell in row) for row in (head, *rows))
+    return lines + [f"{row}  {name}" for row, name in zip(cells, names, strict=True)]
 
 
 def _findings(notes: Iterable[Mapping[str, Any]]) -> list[str]:

@@ -23,7 +23,7 @@ def test_everything_an_engineer_asks_for_stands_before_lmfits_own_report() -> No
         "1 ramps ended at the torque limit",
         "F_s, negative direction: 0 breakaways",
         "5 lie in their 95 % prediction intervals",
-        "starts 0.02 s earlier than recorded",
+        "3.2 −0.0200 1.5 0.003 125 velocity/p0.10.csv",
         "E-OFFSET (warn): seen",
     ):
         assert said in flat, said
