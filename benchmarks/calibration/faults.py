@@ -16,6 +16,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from multiprocessing import get_context
 from typing import Final
 
@@ -35,6 +36,8 @@ SEEDS: Final = 50
 QUICK_SEEDS: Final = 3
 CLEAN: Final = 200
 QUICK_CLEAN: Final = 6
+BEGUN: Final = 1.7e9  # [s] from 1970 to the first log
+APART: Final = 60.0  # [s] from log to log, in the order of the campaign
 _GRAVE: Final = {Severity.WARN: 0, Severity.WITHHOLD: 1, Severity.REFUSE: 2}
 _CODE: Final = re.compile(r"E-[A-Z]+")
 
@@ -102,7 +105,7 @@ def recorded(campaign: Campaign) -> list[Recording]:
     """The logs of a campaign, screened; raises `LogError`."""
     rig = campaign.rig
     counts = (2.0 * math.pi if rig.axis == "rotary" else 1.0) / rig.resolution
-    return [
+    read = (
         screened_recording(
             log,
             clock="column 't'",
@@ -111,4 +114,5 @@ def recorded(campaign: Campaign) -> list[Recording]:
             torque_limit=rig.torque_limit,
         )
         for log in campaign.logs
-    ]
+    )
+    return [replace(recording, begun=BEGUN + APART * n) for n, recording in enumerate(read)]

@@ -7,6 +7,7 @@ a campaign without ramps is told that ramps are missing, whatever it was meant t
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -25,6 +26,7 @@ from benchmarks.calibration.clean_campaigns import (
     steady_log,
 )
 from data.findings import Severity
+from data.recording import FloatArray
 from data.screening import Signals
 from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
@@ -333,8 +335,8 @@ def drift(generator: Generator) -> Injected:
     for place, number in enumerate(order.tolist()):
         log = whole.logs[number]
         warm = 1.0 - loss * place / (order.size - 1)
-        steady = log.protocol == "constant_velocity"
-        logs.append(replace(log, torque=log.torque * warm if steady else log.torque))
+        driven = log.protocol == "frequency_response"
+        logs.append(log if driven else replace(log, torque=log.torque * warm))
     return Injected(
         Campaign(rig, tuple(logs)), (WARN,), "fit", also=("E-NOSTRIBECK", "E-LOWSPEED", "E-BOUND")
     )
@@ -414,45 +416,69 @@ def speed_error(generator: Generator) -> Injected:
             logs.append(steady_log(rig, side * speed, generator, duration=duration))
     logs += [ramp_log(rig, s * 0.45 * rig.static, generator) for s in (1.0, -1.0)]
     return Injected(
-        Campaign(rig, (*logs, *multisine_logs(rig, generator))), (WARN,), "fit", also=("E-LOWSPEED",)
+        Campaign(rig, (*logs, *multisine_logs(rig, generator))),
+        (WARN,),
+        "fit",
+        also=("E-LOWSPEED", "E-QUANT"),
     )
 
 
 def lack_of_fit(generator: Generator) -> Injected:
-    """Friction with a bump that no Stribeck law has, seen several times over."""
-    whole = clean_campaign(generator)
-    rig = whole.rig
+    """Friction with a bump that no Stribeck law has, at speeds that were each run three times."""
+    rig = random_rig(generator)
     size = generator.uniform(0.1, 0.2) * rig.coulomb
     centre = rig.velocity * generator.uniform(6.0, 12.0)
-
-    def bumped(log: Signals) -> Signals:
-        if log.protocol != "constant_velocity":
-            return log
-        speed = abs(_way(log) / (log.time[-1] - log.time[0]))
-        bump = size * math.exp(-((math.log(speed / centre) / 0.6) ** 2))
-        return replace(log, torque=log.torque + math.copysign(bump, _way(log)))
-
-    return _everywhere(whole, bumped, WARN, also=("E-BOUND", "E-LOWSPEED", "E-NOSTRIBECK"))
+    logs = []
+    for side, speed, again in itertools.product((1.0, -1.0), np.geomspace(0.2, 30.0, 8).tolist(), range(3)):
+        name = f"velocity/{side * speed:.4g}_{again}.csv"
+        log = steady_log(rig, side * speed * rig.velocity, generator, name=name)
+        bump = size * math.exp(-((math.log(speed * rig.velocity / centre) / 0.6) ** 2))
+        logs.append(replace(log, torque=log.torque + math.copysign(bump, side)))
+    logs += [ramp_log(rig, s * 0.45 * rig.static, generator) for s in (1.0, -1.0)]
+    return Injected(
+        Campaign(rig, (*logs, *multisine_logs(rig, generator))),
+        (WARN,),
+        "fit",
+        also=("E-BOUND", "E-LOWSPEED", "E-NOSTRIBECK"),
+    )
 
 
 def two_minima(generator: Generator) -> Injected:
-    """Friction that falls twice as much, over 0.3 v_s and over 6 v_s: either may be the Stribeck velocity."""
-    rig = random_rig(generator)
-    speeds = rig.velocity * np.array([0.15, 0.4, 1.0, 2.5, 6.0, 15.0, 40.0])
+    """Speeds whose torques two Stribeck velocities explain equally well, with a worse fit between them."""
+    rig = replace(random_rig(generator), fine=False)
+    speeds = np.array([0.1, 0.3, 1.0, 3.0, 8.0, 20.0, 50.0])
+    torques = _ambiguous(speeds, generator)
     logs = []
-    for side in (1.0, -1.0):
-        for speed in speeds.tolist():
-            log = steady_log(replace(rig, fine=False), side * speed, generator)
-            plain = float(np.median(np.abs(log.torque)))
-            falls = math.exp(-speed / (0.3 * rig.velocity)) + math.exp(-speed / (6.0 * rig.velocity))
-            wanted = rig.coulomb * (1.0 + 0.15 * falls)
-            logs.append(replace(log, torque=log.torque + math.copysign(wanted - plain, side)))
-    return Injected(
-        Campaign(rig, (*logs, *multisine_logs(rig, generator))),
-        (WARN, WITHHOLD),
-        "fit",
-        also=("E-LOWSPEED", "E-BOUND"),
-    )
+    for side, (speed, torque) in itertools.product((1.0, -1.0), zip(speeds, torques, strict=True)):
+        log = steady_log(rig, side * float(speed) * rig.velocity, generator)
+        plain = float(np.median(np.abs(log.torque)))
+        logs.append(replace(log, torque=log.torque + side * (rig.coulomb * float(torque) - plain)))
+    campaign = Campaign(rig, (*logs, *multisine_logs(rig, generator)))
+    return Injected(campaign, (WARN, WITHHOLD), "fit", also=("E-LOWSPEED", "E-BOUND", "E-NOSTRIBECK"))
+
+
+def _ambiguous(speeds: FloatArray, generator: Generator) -> FloatArray:
+    """Torques in F_c at speeds (n,) in v_s, drawn until the best two minima over v_s are equal."""
+    grid = np.geomspace(0.05, 30.0, 60)
+    bases = [np.column_stack((np.ones_like(speeds), np.exp(-speeds / v), speeds)) for v in grid]
+    solvers = np.array([np.linalg.pinv(basis) for basis in bases])
+    while True:
+        drawn = 1.0 + 0.3 * np.exp(-speeds / 2.0) + 0.006 * speeds
+        drawn = drawn + 0.08 * generator.standard_normal((2000, speeds.size))
+        laws = np.einsum("gpn,dn->dgp", solvers, drawn)
+        misfit = np.array(
+            [np.sum((drawn - laws[:, k] @ bases[k].T) ** 2, axis=1) for k in range(grid.size)]
+        ).T
+        sound = np.all(laws > 0.0, axis=2)
+        inner = misfit[:, 1:-1]
+        lowest = (inner < misfit[:, :-2]) & (inner < misfit[:, 2:]) & sound[:, 1:-1]
+        for n in np.flatnonzero(lowest.sum(axis=1) >= 2).tolist():
+            places = np.flatnonzero(lowest[n]) + 1
+            one, two = sorted(places[np.argsort(misfit[n, places])][:2].tolist())
+            least, other = sorted((misfit[n, one], misfit[n, two]))
+            apart = grid[two] > 2.5 * grid[one] and misfit[n, one:two].max() > 1.2 * other
+            if apart and other < 1.1 * least and least < 1.01 * misfit[n][sound[n]].min():
+                return np.asarray(drawn[n])
 
 
 def missing_tests(generator: Generator) -> Injected:

@@ -252,7 +252,8 @@ def test_stamps_that_drift_from_the_log_s_times_are_told(tmp_path: Path, rate: f
         messages.append(hostile.message(1, logged, json.dumps(data).encode()))
     channel = hostile.channel(1, 0, "/joint_states", "json")
     path.write_bytes(hostile.file(channel, *messages))
-    found = read(path).findings
+    named = Signals(position=Signal("/joint_states:position[0]"), torque=Signal("/joint_states:effort[0]"))
+    found = read(path, RigSignals(mcap=named)).findings
     assert [(f.code, f.severity) for f in found] == [("E-CLOCK", Severity.WARN)] * bool(rate)
     assert all("by 0.01999 s over the run, 1 %" in f.text for f in found)
 
