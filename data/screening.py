@@ -33,6 +33,8 @@ BoolArray = NDArray[np.bool_]
 IndexArray = NDArray[np.intp]
 # Protocols of which each part of a split run says something by itself.
 TAKEN_APART: Final = frozenset({"breakaway", "constant_velocity", "excitation"})
+SMALLEST: Final = 1e-12  # largest torque [N m] or position [rad] of a log, below and above which its scale is
+LARGEST: Final = 1e12  # wrong
 FEWEST_SAMPLES: Final = 10
 AT_LIMIT: Final = 0.999  # of a declared torque limit
 FLAT_SAMPLES: Final = 5  # at the largest torque
@@ -138,6 +140,7 @@ def screen(run: Signals, *, clock: str, resolution: float | None, torque_limit: 
         When a detector refuses the run.
     """
     require_finite(run)
+    require_sizes(run)
     require_samples(run)
     run, clocks = advance(run, clock)
     run, wraps = unwrap(run, resolution)
@@ -163,6 +166,18 @@ def require_finite(run: Signals) -> None:
             + (f" (and {bad.size - 1} more)" if bad.size > 1 else "")
             + f"; it would spoil {IDENTIFIES[run.protocol]}. Cut it off with `window`, or exclude the log"
         )
+
+
+def require_sizes(run: Signals) -> None:
+    """Refuse a torque or position of a size that no rig has: a wrong scale."""
+    for name, values in (("torque", run.torque), ("position", run.position)):
+        peak = float(np.max(np.abs(values), initial=0.0))
+        if not (peak == 0.0 or SMALLEST <= peak <= LARGEST):
+            raise LogError(
+                f"{run.log}: the {name} reaches {peak:g} in SI, which no rig does (from {SMALLEST:g} to "
+                f"{LARGEST:g}): nothing can be fitted to it. Correct its `unit`, `scale` or `offset` in "
+                "campaign.toml"
+            )
 
 
 def require_samples(run: Signals) -> None:

@@ -10,11 +10,7 @@ import hashlib
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
 
-import numpy as np
-
-from data.findings import LogError
 from data.ingest import read_recording
 from data.protocols import ProtocolName, SetPoint
 from data.recording import Recording
@@ -62,8 +58,6 @@ class SetPointLogs:
     excluded: tuple[RunUse, ...]
 
 
-SMALLEST: Final = 1e-12  # [N m, rad] a peak below is no signal of a rig
-LARGEST: Final = 1e12  # [N m, rad]
 IDENTIFYING: tuple[ProtocolName, ...] = ("breakaway", "constant_velocity", "frequency_response", "excitation")
 
 
@@ -108,20 +102,7 @@ def read_log(task: LogToRead) -> Recording:
         window=task.experiment.window.get(task.log),
         salvage=task.salvage,
     )
-    _refuse_absurd(recording)
     return replace(recording, metadata=dict(recording.metadata))  # a plain dict travels between processes
-
-
-def _refuse_absurd(recording: Recording) -> None:
-    """Refuse a torque or position of a size that no rig has: a wrong scale; raises `LogError`."""
-    for name, values in (("torque", recording.torque), ("position", recording.position)):
-        peak = float(np.max(np.abs(values), initial=0.0))
-        if not (peak == 0.0 or SMALLEST <= peak <= LARGEST):
-            raise LogError(
-                f"{recording.log}: the {name} reaches {peak:g} in SI, which no rig does (from "
-                f"{SMALLEST:g} to {LARGEST:g}): nothing can be fitted to it. Correct its `unit`, `scale` "
-                "or `offset` in campaign.toml"
-            )
 
 
 def set_point_logs(

@@ -228,11 +228,26 @@ def test_an_unknown_signal_is_named(copied: Path, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_missing_direction_is_refused(copied: Path, tmp_path: Path) -> None:
+def test_a_missing_direction_is_withheld_and_the_other_never_copied(copied: Path, tmp_path: Path) -> None:
     for log in (*copied.parent.glob("velocity/n*"), *copied.parent.glob("breakaway/n*")):
         log.unlink()
+    out = tmp_path / "out"
+    result = stribeck("run", copied, "-o", out)
+    assert result.exit_code == 3, result.output
+    robot = json.loads((out / "robot.json").read_text(encoding="utf-8"))
+    assert all(robot["positive"][name]["value"] is not None for name in ("static_torque", "coulomb_torque"))
+    for law in ("negative", "mean"):
+        for estimate in robot[law].values():
+            assert estimate["value"] is None
+            assert "negative" in estimate["withheld"]
+    assert (out / "report.html").exists()
+
+
+def test_both_directions_missing_are_refused(copied: Path, tmp_path: Path) -> None:
+    for log in (*copied.parent.glob("velocity/*"), *copied.parent.glob("breakaway/*")):
+        log.unlink()
     result = stribeck("run", copied, "-o", tmp_path / "out")
-    assert_refused(result, 1, "negative")
+    assert result.exit_code in {1, 2}, result.output
     assert not (tmp_path / "out").exists()
 
 
