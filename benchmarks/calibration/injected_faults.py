@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
+from scipy.optimize import brentq, nnls
 
 from benchmarks.calibration.clean_campaigns import (
     Campaign,
@@ -444,41 +445,37 @@ def lack_of_fit(generator: Generator) -> Injected:
 
 
 def two_minima(generator: Generator) -> Injected:
-    """Speeds whose torques two Stribeck velocities explain equally well, with a worse fit between them."""
+    """A friction that falls in two steps far apart: a Stribeck velocity explains either as well."""
     rig = replace(random_rig(generator), fine=False)
-    speeds = np.array([0.1, 0.3, 1.0, 3.0, 8.0, 20.0, 50.0])
-    torques = _ambiguous(speeds, generator)
+    speeds = np.geomspace(0.06, 300.0, 24)
+    torques = _two_steps(speeds, generator)
     logs = []
     for side, (speed, torque) in itertools.product((1.0, -1.0), zip(speeds, torques, strict=True)):
         log = steady_log(rig, side * float(speed) * rig.velocity, generator)
         plain = float(np.median(np.abs(log.torque)))
         logs.append(replace(log, torque=log.torque + side * (rig.coulomb * float(torque) - plain)))
     campaign = Campaign(rig, (*logs, *multisine_logs(rig, generator)))
-    return Injected(campaign, (WARN, WITHHOLD), "fit", also=("E-LOWSPEED", "E-BOUND", "E-NOSTRIBECK"))
+    also = ("E-LOWSPEED", "E-BOUND", "E-NOSTRIBECK", "E-LACKOFFIT")
+    return Injected(campaign, (WARN, WITHHOLD), "fit", also=also)
 
 
-def _ambiguous(speeds: FloatArray, generator: Generator) -> FloatArray:
-    """Torques in F_c at speeds (n,) in v_s, drawn until the best two minima over v_s are equal."""
-    grid = np.geomspace(0.05, 30.0, 60)
-    bases = [np.column_stack((np.ones_like(speeds), np.exp(-speeds / v), speeds)) for v in grid]
-    solvers = np.array([np.linalg.pinv(basis) for basis in bases])
-    while True:
-        drawn = 1.0 + 0.3 * np.exp(-speeds / 2.0) + 0.006 * speeds
-        drawn = drawn + 0.08 * generator.standard_normal((2000, speeds.size))
-        laws = np.einsum("gpn,dn->dgp", solvers, drawn)
-        misfit = np.array(
-            [np.sum((drawn - laws[:, k] @ bases[k].T) ** 2, axis=1) for k in range(grid.size)]
-        ).T
-        sound = np.all(laws > 0.0, axis=2)
-        inner = misfit[:, 1:-1]
-        lowest = (inner < misfit[:, :-2]) & (inner < misfit[:, 2:]) & sound[:, 1:-1]
-        for n in np.flatnonzero(lowest.sum(axis=1) >= 2).tolist():
-            places = np.flatnonzero(lowest[n]) + 1
-            one, two = sorted(places[np.argsort(misfit[n, places])][:2].tolist())
-            least, other = sorted((misfit[n, one], misfit[n, two]))
-            apart = grid[two] > 2.5 * grid[one] and misfit[n, one:two].max() > 1.2 * other
-            if apart and other < 1.1 * least and least < 1.01 * misfit[n][sound[n]].min():
-                return np.asarray(drawn[n])
+def _two_steps(speeds: FloatArray, generator: Generator) -> FloatArray:
+    """Torques in F_c at speeds (n,) in v_s, the steps so high that both minima over v_s are equally deep."""
+    height = generator.uniform(0.4, 0.8)
+    early = np.exp(-((speeds / 0.3) ** 4))
+    late = np.exp(-((speeds / 30.0) ** 4))
+    grid = np.geomspace(0.06, 100.0, 80)
+    bases = [np.column_stack((np.ones_like(speeds), np.exp(-speeds / v), speeds / 300.0)) for v in grid]
+
+    def torques(part: float) -> FloatArray:
+        return np.asarray(1.0 + 3e-4 * speeds + height * (part * early + (1.0 - part) * late))
+
+    def favour(part: float) -> float:
+        """By how much the late step is explained worse than the early one."""
+        misfit = np.array([nnls(basis, torques(part))[1] for basis in bases])
+        return float(misfit[grid > 3.0].min() - misfit[grid < 3.0].min())
+
+    return torques(float(brentq(favour, 0.1, 0.9, xtol=1e-4)))
 
 
 def missing_tests(generator: Generator) -> Injected:

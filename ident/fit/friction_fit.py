@@ -33,7 +33,7 @@ GRID = 40  # Stribeck velocities tried as starts in each law
 STARTS = 8  # polished by the full fit
 SHAPES = (1.0, 0.6, 1.8)  # of beta, where it is free
 FELT = 0.1  # change of the residuals, in standard errors, under a parameter's own size: less is not felt
-SAME = 1.0  # chi-square above the least, below which another minimum is as good
+SAME = 4.0  # chi-square above the least, below which another minimum lies in the 95 % region
 APART = 0.5  # of ln v_s, beyond which two minima are two
 
 

@@ -12,6 +12,8 @@ from ident.fit.law_model import LawName
 from ident.fit.parameters import Parameters, law_values
 from ident.fit.withholding import where
 
+APART = 0.1  # of v_s: the two minima differ in a law
+
 
 def without_disputed(values: Parameters) -> Parameters:
     """The parameters, those withheld in which the other minimum lies outside the interval (E-LOCAL)."""
@@ -54,7 +56,7 @@ def _disputed(estimate: Estimate, other: float) -> bool:
 
 def _reason(name: str, estimate: Estimate, other: float, law: LawName) -> str:
     return (
-        f"E-LOCAL: {where(law)}: two minima fit equally well, with {name} = {estimate.value:.3g} or "
+        f"E-LOCAL: {where(law)}: two minima fit about equally well, with {name} = {estimate.value:.3g} or "
         f"{other:.3g}, further apart than the interval of either. More speeds around v_s tell."
     )
 
@@ -72,11 +74,18 @@ def minimum_findings(values: Parameters) -> tuple[Finding, ...]:
     fit, other = values.fit, values.fit.other_minimum
     if other is None:
         return ()
-    pairs = "; ".join(f"{where(law)}: {_both(fit, other, law)}" for law in fit.model.laws)
+    pairs = "; ".join(
+        f"{where(law)}: {_both(fit, other, law)}" for law in fit.model.laws if _differ(fit, other, law)
+    )
     laws = [*values.curves.values(), values.mean]
     disputed = any((own[name].withheld or "").startswith("E-LOCAL") for own in laws for name in own)
-    text = f"two minima fit equally well: {pairs}. More speeds around v_s tell."
+    text = f"two minima fit about equally well: {pairs}. More speeds around v_s tell."
     return (Finding("E-LOCAL", Severity.WITHHOLD if disputed else Severity.WARN, text),)
+
+
+def _differ(fit: FrictionFit, other: Mapping[str, float], law: LawName) -> bool:
+    first, second = (law_values(values, law)["stribeck_velocity"] for values in (fit.values, other))
+    return abs(second - first) > APART * first
 
 
 def _both(fit: FrictionFit, other: Mapping[str, float], law: LawName) -> str:
