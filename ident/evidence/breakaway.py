@@ -161,7 +161,10 @@ def _start(recording: Recording, rest: Stretch, after: int) -> Breakaway | None:
         return _creep(recording, rest, place, float(np.max(np.abs(away))) / resolution)
     sustained = int(far[0]) + searched
     direction = 1 if away[sustained] > 0 else -1
-    before = int(np.flatnonzero(direction * away[: sustained + 1] < least)[-1])
+    near = np.flatnonzero(direction * away[: sustained + 1] < least)
+    if near.size == 0:
+        return None  # it was never at the place that it left: a rest of wrong samples
+    before = int(near[-1])
     onset = rest.first + before + 1
     end = _end_of_motion(recording, rest.first + sustained, after, direction)
     start = Breakaway(

@@ -172,6 +172,14 @@ def _steady_run(recording: Recording, step: Stretch, *, meant: int) -> SteadyRun
             "torque is not the friction at one speed. Record it for longer, or set `window` to its steady "
             "part.",
         )
+    kept = abs(run.velocity) * (run.end_time - run.start_time) / grain(recording)
+    if kept < LEAST_COUNTS:
+        return replace(
+            run,
+            why=f"E-STICKSLIP: the link moves {kept:.1f} counts in the steady part of the run, from "
+            f"{run.start_time:.3g} s to {run.end_time:.3g} s, and more outside it: it stops on the way, or "
+            "its position was not updated. Record it again.",
+        )
     limited = _share_at_limit(recording, window)
     if limited > LIMITED_SHARE:
         return replace(

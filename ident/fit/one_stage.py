@@ -66,7 +66,7 @@ def explain(evidence: Evidence, *, axis: Axis, assumptions: Assumptions) -> Expl
     unit = UNITS[axis]["inertia"]
     sources: dict[str, Estimate] = {}
     findings: list[Finding] = list(missing.findings)
-    if evidence.momenta:
+    if "inertia" in weighted.fit.free:  # the motion may have told none
         sources["breakaway"] = _inertia_of(weighted, unit)
     if evidence.response is not None:
         response, refusal = _response_source(evidence.response, weighted, unit=unit)

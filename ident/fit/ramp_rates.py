@@ -32,7 +32,7 @@ from data.recording import FloatArray
 RateShape = Literal["linear", "logarithmic"]
 BENDS: Final = 16  # values of u'_0 that are tried
 REACH: Final = 10.0  # by which u'_0 may lie below the slowest and above the fastest rate
-CHANCE: Final = 0.004  # of a trend where there is none, for each of two shapes
+CHANCE: Final = 0.001  # of a trend where there is none, for each of two shapes
 APART: Final = 1.3  # ratio of two rates that differ
 TINY: Final = float(np.finfo(np.float64).tiny)
 SPARE: Final = 3  # least number of breakaways beyond the parameters

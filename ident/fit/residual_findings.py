@@ -29,6 +29,7 @@ from ident.fit.residual_tests import runs_test
 from ident.fit.weighting import Weighted, law_slopes
 
 WAVES = 6  # slow ones over the ranks of the speeds
+DRIFT_CHANCE = 5e-4  # of a drift: dated logs that were run in order of speed leave few data to tell
 SAME_SPEED = 0.02  # relative difference of speeds that are replicates
 LEAST_REPLICATES = 3  # degrees of freedom within speeds
 SPEED_SHARE = 0.3  # of the torque's error
@@ -64,7 +65,7 @@ def _drift(weighted: Weighted, seen: Circumstances, axis: Axis) -> list[Finding]
     offset = added(weighted, (time / span * sign)[:, None], groups=means * sign[:, None])
     over = f"over {span:.3g} s of recording" if len(groups) == 1 else f"within logs, over {span:.3g} s"
     advice = "Warm the rig up, repeat the first speed at the end, and mix the order of the speeds."
-    if friction is not None and friction.chance < CHANCE:
+    if friction is not None and friction.chance < DRIFT_CHANCE:
         part, typical = float(friction.coefficients[0]), float(np.median(size))
         text = (
             f"friction changes by {100 * part:+.2g} % ({part * typical:+.2g} {unit}) {over} "
@@ -72,7 +73,7 @@ def _drift(weighted: Weighted, seen: Circumstances, axis: Axis) -> list[Finding]
             f"were run in order the change bends b and F_c. {advice}"
         )
         return [Finding("E-DRIFT", Severity.WARN, text)]
-    if offset is not None and offset.chance < CHANCE:
+    if offset is not None and offset.chance < DRIFT_CHANCE:
         text = (
             f"an offset of the torque changes by {float(offset.coefficients[0]):+.2g} {unit} {over} "
             f"(p = {offset.chance:.1g}): F_c and F_s of the two directions are moved against each other. "

@@ -83,3 +83,15 @@ def test_two_segments_of_a_drifting_speed_are_corrected_by_its_slope() -> None:
     velocity = 0.5 * (1 + 0.005 * time)
     (run,) = steady_runs(_log(np.cumsum(velocity) * 1e-3, np.full(time.size, 0.4)))
     assert run.acceleration == pytest.approx(0.0025, rel=0.05)
+
+
+def test_a_position_that_was_not_updated_is_no_speed() -> None:
+    """A frozen stretch in a moving run is never used with a speed of zero."""
+    generator = np.random.default_rng(8)
+    position = 0.5 * 1e-3 * np.arange(4000)
+    for first in (500, 1500, 2900):
+        frozen = position.copy()
+        frozen[first : first + 1000] = frozen[first]
+        log = _log(np.asarray(frozen), 0.4 + 0.005 * generator.standard_normal(4000))
+        for run in steady_runs(log):
+            assert run.why is not None or abs(run.velocity) * (run.end_time - run.start_time) > 20 * 2e-5
