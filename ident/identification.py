@@ -141,7 +141,8 @@ def _axis(recordings: Sequence[Recording]) -> Axis:
 def _missing_tests(evidence: Evidence) -> list[Finding]:
     found = []
     for direction in DIRECTIONS:
-        if not any(start.direction == SIGN[direction] for start in evidence.used_starts):
+        starts = [start for start in evidence.starts if start.direction == SIGN[direction]]
+        if not any(start.why is None or start.is_censored for start in starts):
             text = (
                 f"{direction} direction: no breakaway was recorded: F_s rests on the slowest speeds alone. "
                 "Ramps from "

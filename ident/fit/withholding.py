@@ -91,10 +91,12 @@ def withheld(
     least = interval["stribeck_torque"].low
     line = law in data.model.lines
     if line or least is None or least <= 0.0 or stribeck <= 0.0:
+        # A value far above every torque is one that the data do not hold.
+        seen = f", {stribeck:.3g}," if stribeck < float(np.max(np.abs(data.torque))) else ""
         withhold(
             "E-NOSTRIBECK",
             ("stribeck_velocity", "stribeck_shape"),
-            f"{where(law)}: F_s - F_c = {stribeck:.3g} with an interval that holds 0: no Stribeck "
+            f"{where(law)}: the interval of F_s - F_c{seen} holds 0: no Stribeck "
             f"effect is seen, so its velocity has no meaning{_LINE if line else ''}. "
             f"Record speeds below {0.2 * float(speeds.min()):.2g} and breakaways if one is expected.",
         )

@@ -145,8 +145,14 @@ def _findings(notes: Iterable[Mapping[str, Any]]) -> list[str]:
     return [
         line
         for note in ranked
-        for line in _item(f"{note['code']} ({note['severity']}): {shown(str(note['text']), _LONGEST)}")
+        for line in _item(f"{note['code']} ({note['severity']}): {shown(_with_log(note), _LONGEST)}")
     ]
+
+
+def _with_log(note: Mapping[str, Any]) -> str:
+    """A finding with the log it was seen in, where its text does not name it."""
+    text, log = str(note["text"]), note.get("log")
+    return text if not log or str(log) in text else f"{log}: {text}"
 
 
 def _item(text: str) -> list[str]:

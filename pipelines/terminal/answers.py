@@ -49,6 +49,7 @@ def diagram(document: Mapping[str, Any]) -> list[str]:
 def advice(document: Mapping[str, Any]) -> list[str]:
     """What to record next, a few lines a quantity."""
     lines = ["what to record next: half-width of the 95 % interval, as expected"]
+    units = {one["quantity"]: one["unit"] for one in document["advice"]}
     for one in document["advice"]:
         what = f"{one['direction']} {one['quantity'].replace('_', ' ')} [{one['unit']}]"
         if one["why_none"] is not None:
@@ -57,16 +58,16 @@ def advice(document: Mapping[str, Any]) -> list[str]:
         now, then = _number(one["half_width_now"], "unbounded"), _number(one["half_width_then"])
         reduced = "" if one["reduction"] is None else f" (-{100 * one['reduction']:.0f} %)"
         lines.append(f"  {what}: {now} now, {then} with all of these{reduced}")
-        lines += [f"    {_next_run(run)}" for run in one["runs"]]
+        lines += [f"    {_next_run(run, units)}" for run in one["runs"]]
     return lines
 
 
-def _next_run(run: Mapping[str, Any]) -> str:
+def _next_run(run: Mapping[str, Any], units: Mapping[str, str]) -> str:
     after = f"then {_number(run['half_width'])}"
     if run["protocol"] == "breakaway":
-        rate = f"at {_number(run['ramp_rate'])} a second"
+        rate = f"at {_number(run['ramp_rate'])} {units['static_torque']}/s"
         return f"{run['times']} x breakaway, {run['direction']}, {rate}; {after}"
-    speed = f"speed {_number(run['speed'])} for {_number(run['duration'])} s"
+    speed = f"{_number(run['speed'])} {units['stribeck_velocity']} for {_number(run['duration'])} s"
     return f"{run['times']} x constant velocity, {run['direction']}, {speed}; {after}"
 
 
