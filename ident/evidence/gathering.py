@@ -66,7 +66,8 @@ def gather(recordings: Sequence[Recording]) -> Evidence:
     response, reasons = frequency_inertia(_of(recordings, "frequency_response"))
     inertia = response.inertia if response is not None else _rough_inertia(runs, momenta)
     steady = tuple(runs) if inertia is None else _without_hunting(recordings, runs, inertia)
-    waves = find_waves(traces_of(recordings, steady, inertia))
+    turns = any(recording.axis == "rotary" for recording in recordings)
+    waves = find_waves(traces_of(recordings, steady, inertia), turns=turns)
     return Evidence(
         corrected_runs(recordings, steady, waves),
         corrected_starts(starts, waves),

@@ -12,8 +12,9 @@ friction that follows its change of speed,
 
 with one wavenumber k [rad^-1, or m^-1] a wave for all runs and A, B of each direction d: a torque ripple is
 the same both ways, a friction ripple flips. Both directions are pooled where they agree. k is searched for
-on a continuous grid, strongest wave first; a wave has to stand far out of the neighbouring wavenumbers, and
-the runs have to agree on its phase, or positions are not absolute from log to log. A wave on whose phase they
+on a continuous grid and beyond its ends, strongest wave first, and taken as whole where the positions are
+angles and a whole one explains as much (gravity: one in a turn); a wave has to stand far out of the
+neighbouring wavenumbers, and the runs have to agree on its phase, or positions are not absolute from log to log. A wave on whose phase they
 do not agree cannot be taken out: its size then is an error of each run and each breakaway.
 """
 
@@ -35,6 +36,10 @@ SAMPLES = 4  # a block, at least
 GRID = 3000  # wavenumbers that are tried, at most
 STEP = 0.2  # of the wavenumbers' grid, in cycles over the longest run
 LEAST_WAVES = 1.5  # in the longest run
+SHORTEST_WAVES = 0.6  # in the longest run: part of a wave that is still told from a bend
+REFINEMENTS = 4  # quarterings of the grid's step
+MOST_LOOKS = 30  # for the top of a wave's power
+AS_MUCH = 0.995  # of a wave's power, that a whole wavenumber has to explain
 OWN_WAVES = 1.0  # in a run that is asked for a phase of its own
 FINEST = 1.2  # largest phase that a block may cover
 NEIGHBOURS = 150  # wavenumbers on each side of a wave whose power is the background
@@ -161,8 +166,11 @@ def trace(recording: Recording, run: SteadyRun, *, inertia: float | None, slope:
     return Trace(run.direction, position[1:-1], torque, np.asarray(smooth), run.travel / blocks)
 
 
-def find_waves(traces: Sequence[Trace]) -> tuple[Wave, ...]:
-    """The waves that stand out, strongest first; one that is not coherent ends the search."""
+def find_waves(traces: Sequence[Trace], *, turns: bool = False) -> tuple[Wave, ...]:
+    """The waves that stand out, strongest first; one that is not coherent ends the search.
+
+    With `turns`, positions are angles: a wave that may as well go into the turn a whole number of times does.
+    """
     long = [own for own in traces if own.travel > 0]
     if not long:
         return ()
@@ -173,13 +181,14 @@ def find_waves(traces: Sequence[Trace]) -> tuple[Wave, ...]:
         common = np.where(_near(grid, found, long), 0.0, common)
         peak = int(np.argmax(common / _background(common)))
         wavenumber = _refined(left, float(grid[peak]), float(grid[1] - grid[0]), noise)
+        wavenumber = _in_a_turn(left, wavenumber, noise) if turns else wavenumber
         after = _without(long, [*found, wavenumber], noise)
         quiet = _noise(after)
         # Judged against what is left, since a strong wave leaks over its neighbours and is noise of its own.
         beside = slice(max(peak - NEIGHBOURS, 0), peak + NEIGHBOURS + 1)
         background = float(_background(_power(after, grid[beside], quiet)[0])[peak - beside.start])
         power = float(_power(left, np.array([wavenumber]), quiet)[0][0])
-        around = grid[_near(grid, [wavenumber], long)]
+        around = np.append(grid[_near(grid, [wavenumber], long)], wavenumber)
         own = float(np.max(_power(left, around, quiet)[1], initial=0.0))
         askable = 2 * sum(wavenumber * run.travel > 2 * np.pi * OWN_WAVES for run in long)
         agreed = power - 4 > AGREE * (own - askable)
@@ -264,12 +273,29 @@ def _background(power: FloatArray) -> FloatArray:
 
 
 def _refined(traces: Sequence[Trace], wavenumber: float, step: float, noise: Sequence[float]) -> float:
-    """The wavenumber of the greatest power near one of the grid's."""
-    for _ in range(4):
-        near = wavenumber + step * np.linspace(-1.0, 1.0, 11)
+    """The wavenumber of the greatest power near one of the grid's.
+
+    Where the power still rises at the edge of what was looked at, it is followed: a wave longer than the
+    grid's longest, as gravity's often is, shows at the grid's end.
+    """
+    least = 2 * np.pi * SHORTEST_WAVES / max(own.travel for own in traces)
+    finest = step / 4**REFINEMENTS
+    for _ in range(MOST_LOOKS):
+        near = np.maximum(wavenumber + step * np.linspace(-1.0, 1.0, 11), least)
         power, _ = _power(traces, near, noise)
-        wavenumber, step = float(near[int(np.argmax(power))]), step / 4
+        best = int(np.argmax(power))
+        inside = 0 < best < near.size - 1 or near[best] == least
+        wavenumber, step = float(near[best]), step / 4 if inside else step
+        if step <= finest:
+            break
     return wavenumber
+
+
+def _in_a_turn(traces: Sequence[Trace], wavenumber: float, noise: Sequence[float]) -> float:
+    """The whole wavenumber next to one, where it explains as much: what turns repeats with a turn."""
+    whole = float(max(round(wavenumber), 1))
+    own, other = _power(traces, np.array([wavenumber, whole]), noise)[0]
+    return whole if other >= AS_MUCH * own else wavenumber
 
 
 def _solved(

@@ -88,3 +88,17 @@ def test_what_is_taken_out_is_taken_out_of_runs_and_breakaways() -> None:
         curve = rig.robot.friction.positive if run.direction > 0 else rig.robot.friction.negative
         assert run.direction * run.torque == pytest.approx(float(curve.total(abs(run.velocity))), abs=1.5e-3)
     assert all(0 < start.place_stderr < 2e-3 for start in evidence.starts)
+
+
+def test_gravity_is_one_wave_a_turn_though_few_runs_cover_one() -> None:
+    """Most runs are under a turn: the wave is longer than the grid's longest, and snaps to the turn."""
+    rig = Rig(ripple=0.05, ripple_cycles=1.0, torque_noise=0.005)
+    logs = [
+        rig.speeds([sign * speed], np.random.default_rng(12), log=f"{sign * speed:.3g}", start=0.07)
+        for speed in (0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0, 1.8)
+        for sign in (1, -1)
+    ]
+    wave = find_waves(_traces(logs), turns=True)[0]
+    assert wave.coherent
+    assert wave.wavenumber == 1.0
+    assert wave.amplitude == pytest.approx(0.05, rel=0.05)
