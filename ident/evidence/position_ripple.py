@@ -14,8 +14,9 @@ with one wavenumber k [rad^-1, or m^-1] a wave for all runs and A, B of each dir
 the same both ways, a friction ripple flips. Both directions are pooled where they agree. k is searched for
 on a continuous grid and beyond its ends, strongest wave first, and taken as whole where the positions are
 angles and a whole one explains as much (gravity: one in a turn); a wave has to stand far out of the
-neighbouring wavenumbers, and the runs have to agree on its phase, or positions are not absolute from log to log. A wave on whose phase they
-do not agree cannot be taken out: its size then is an error of each run and each breakaway.
+neighbouring wavenumbers, and the runs have to agree on its phase, or positions are not absolute from log to
+log. A wave on whose phase they do not agree cannot be taken out: its size then is an error of each run and
+each breakaway.
 """
 
 from __future__ import annotations
