@@ -132,7 +132,9 @@ def test_the_truth_is_recovered(name: str, with_response: bool) -> None:
     held_out = validation.held_out
     assert len(held_out.points) == len(found.friction_map)
     assert held_out.standardised_rms is not None
-    assert 0.4 < held_out.standardised_rms < 1.5
+    # Errors have a floor of 1e-4 of the torque, under which a heavy rig's noise lies.
+    floored = rig.torque_noise < 1e-3 * rig.robot.friction.positive.coulomb_torque
+    assert (0.2 if floored else 0.4) < held_out.standardised_rms < 1.5
     assert len(validation.ramps) == 12
 
 
