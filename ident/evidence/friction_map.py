@@ -222,15 +222,15 @@ def _measure(recording: Recording, window: Stretch) -> SteadyRun:
     hunting = _slope_scatter(centred, offset - basis @ np.array([offset.mean(), slope, bend])) / duration
     bend_error = 12.0 * rounding / duration
     acceleration = 2.0 * bend / duration**2
-    scatter = float(np.mean(np.diff(torque) ** 2)) / 2.0 if torque.size > 1 else 0.0
+    white_stderr, block_ratio = torque_scatter(torque)
     return SteadyRun(
         log=recording.log,
         velocity=float(slope / duration),
         velocity_stderr=float(np.hypot(rounding, hunting)),
         torque=float(torque.mean()),
         acceleration=float(acceleration) if abs(acceleration) > 2.0 * bend_error else 0.0,
-        white_stderr=float(np.sqrt(scatter / torque.size)),
-        block_ratio=_block_ratio(torque, scatter),
+        white_stderr=white_stderr,
+        block_ratio=block_ratio,
         travel=abs(_travel(recording, window.first, window.last)),
         swing=swing(recording, window),
         start_time=float(time[0]),
@@ -259,12 +259,15 @@ def _slope_scatter(centred: FloatArray, residual: FloatArray) -> float:
     return float(np.sqrt(np.sum(means**2) / (blocks - 3) / np.sum(middles**2)))
 
 
-def _block_ratio(torque: FloatArray, scatter: float) -> float:
+def torque_scatter(torque: FloatArray) -> tuple[float, float]:
+    """`white_stderr` [N m] and `block_ratio` of the torque (n,) [N m] of a steady run."""
+    scatter = float(np.mean(np.diff(torque) ** 2)) / 2.0 if torque.size > 1 else 0.0
+    white_stderr = float(np.sqrt(scatter / torque.size))
     blocks = min(BLOCKS, torque.size // 4)
     if blocks < 4 or scatter == 0.0:
-        return 1.0
+        return white_stderr, 1.0
     means = np.array([piece.mean() for piece in np.array_split(torque, blocks)])
-    return float(np.var(means, ddof=1) / (scatter * blocks / torque.size))
+    return white_stderr, float(np.var(means, ddof=1) / (scatter * blocks / torque.size))
 
 
 def _steady_window(recording: Recording, step: Stretch) -> Stretch:

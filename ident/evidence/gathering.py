@@ -18,7 +18,12 @@ from ident.evidence.friction_map import SteadyRun, steady_runs
 from ident.evidence.hunting import SAMPLES, hunts, sensor_noise
 from ident.evidence.momentum import Momentum, momentum
 from ident.evidence.position_ripple import Wave, find_waves, traces_of
-from ident.evidence.ripple_correction import corrected_motions, corrected_runs, corrected_starts
+from ident.evidence.ripple_correction import (
+    corrected_motions,
+    corrected_runs,
+    corrected_starts,
+    without_wave_scatter,
+)
 
 NEAR = 3.0  # ratio of speeds within which friction is of one size
 ABSURD = 50.0  # ratio of two torques, or two inertias, that ought to be of one size
@@ -69,7 +74,7 @@ def gather(recordings: Sequence[Recording]) -> Evidence:
     turns = any(recording.axis == "rotary" for recording in recordings)
     waves = find_waves(traces_of(recordings, steady, inertia), turns=turns)
     return Evidence(
-        corrected_runs(recordings, steady, waves),
+        corrected_runs(recordings, without_wave_scatter(recordings, steady, waves), waves),
         corrected_starts(starts, waves),
         corrected_motions(momenta, waves),
         response,

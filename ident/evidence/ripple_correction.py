@@ -15,7 +15,7 @@ import numpy as np
 from data.findings import Finding, Severity
 from data.recording import Axis, FloatArray, Recording
 from ident.evidence.breakaway import Breakaway
-from ident.evidence.friction_map import SteadyRun
+from ident.evidence.friction_map import SteadyRun, torque_scatter
 from ident.evidence.momentum import Momentum
 from ident.evidence.position_ripple import Wave
 
@@ -37,6 +37,26 @@ def corrected_runs(
         error = float(np.hypot(run.place_stderr, error))
         corrected.append(replace(run, torque=run.torque - torque, place_stderr=error))
     return tuple(corrected)
+
+
+def without_wave_scatter(
+    recordings: Sequence[Recording], runs: Sequence[SteadyRun], waves: Sequence[Wave]
+) -> tuple[SteadyRun, ...]:
+    """The runs with the scatter of their torque as all waves leave it, or a wave that is known and taken out
+    would count a second time, as noise.
+    """
+    if not any(wave.coherent for wave in waves):
+        return tuple(runs)
+    by_name = {recording.log: recording for recording in recordings}
+    rescattered = []
+    for run in runs:
+        recording = by_name[run.log]
+        first, past = np.searchsorted(recording.time, [run.start_time, run.end_time])
+        place = recording.position[first : past + 1]
+        known = sum((wave.torque(place, run.direction) for wave in waves), np.zeros_like(place))
+        white, ratio = torque_scatter(recording.torque[first : past + 1] - known)
+        rescattered.append(replace(run, white_stderr=white, block_ratio=ratio))
+    return tuple(rescattered)
 
 
 def corrected_starts(starts: Sequence[Breakaway], waves: Sequence[Wave]) -> tuple[Breakaway, ...]:

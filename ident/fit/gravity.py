@@ -16,7 +16,13 @@ import numpy as np
 from data.recording import FloatArray, Recording
 from ident.evidence.gathering import Evidence
 from ident.evidence.position_ripple import Wave
-from ident.evidence.ripple_correction import corrected_motions, corrected_runs, corrected_starts, is_turn
+from ident.evidence.ripple_correction import (
+    corrected_motions,
+    corrected_runs,
+    corrected_starts,
+    is_turn,
+    without_wave_scatter,
+)
 from ident.fit.added_columns import CHANCE, Added, added
 from ident.fit.circumstances import Circumstances, circumstances
 from ident.fit.one_stage import Explained
@@ -67,10 +73,11 @@ def _wave(coefficients: FloatArray, covariance: FloatArray) -> Wave:
 
 
 def _less(recordings: Sequence[Recording], evidence: Evidence, wave: Wave) -> Evidence:
+    waves = (*evidence.waves, wave)
     return replace(
         evidence,
-        runs=corrected_runs(recordings, evidence.runs, [wave]),
+        runs=corrected_runs(recordings, without_wave_scatter(recordings, evidence.runs, waves), [wave]),
         starts=corrected_starts(evidence.starts, [wave]),
         momenta=corrected_motions(evidence.momenta, [wave]),
-        waves=(*evidence.waves, wave),
+        waves=waves,
     )

@@ -35,7 +35,9 @@ def _robot(inertia: float, static: float, velocity: float, damping: float) -> On
 RIGS = {
     "bench": Rig(ripple=0.002, torque_noise=0.01),
     "coarse": Rig(resolution=2 * math.pi / 2000, torque_noise=0.02),
-    "heavy": Rig(robot=_robot(100.0, 50.0, 0.05, 30.0), period=0.01, resolution=6e-6, ripple=0.2),
+    "heavy": Rig(
+        robot=_robot(100.0, 50.0, 0.05, 30.0), period=0.01, resolution=6e-6, torque_noise=0.1, ripple=0.2
+    ),
     "light": Rig(robot=_robot(3e-4, 0.05, 0.5, 2e-3), period=1e-3, resolution=1e-4, torque_noise=0.005),
     "linear": Rig(robot=_robot(95.0, 30.0, 0.02, 200.0), resolution=1e-6, torque_noise=0.5),
 }
@@ -132,9 +134,7 @@ def test_the_truth_is_recovered(name: str, with_response: bool) -> None:
     held_out = validation.held_out
     assert len(held_out.points) == len(found.friction_map)
     assert held_out.standardised_rms is not None
-    # Errors have a floor of 1e-4 of the torque, under which a heavy rig's noise lies.
-    floored = rig.torque_noise < 1e-3 * rig.robot.friction.positive.coulomb_torque
-    assert (0.2 if floored else 0.4) < held_out.standardised_rms < 1.5
+    assert 0.4 < held_out.standardised_rms < 1.5
     assert len(validation.ramps) == 12
 
 
