@@ -155,7 +155,7 @@ def _without_idle(robot: OneLinkRobot) -> OneLinkRobot:
 def _differing(robot: OneLinkRobot, model: OneLinkRobot) -> str:
     """In what two robots that are not the same differ, in words."""
     pairs = [
-        (getattr(robot.friction, direction), getattr(model.friction, direction)) for direction in DIRECTIONS
+        (curve_of(robot.friction, direction), curve_of(model.friction, direction)) for direction in DIRECTIONS
     ]
     names = [
         field.name.replace("_", " ")

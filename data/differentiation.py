@@ -1,17 +1,13 @@
 r"""Velocity and acceleration from encoder positions, offline, with standard errors.
 
 The model is the kinematic one: position, velocity and acceleration, driven by white jerk of spectral density
-S, and a position measured with noise of variance R. Between samples h apart
-
-    F = [[1, h, h^2/2], [0, 1, h], [0, 0, 1]],    Q = S [[h^5/20, h^4/8, h^3/6], [h^4/8, h^3/3, h^2/2],
-                                                         [h^3/6, h^2/2, h]].
-
-A Kalman filter runs forwards and a Rauch-Tung-Striebel smoother backwards over it, so that every sample uses
-the past and the future; the smoother's covariances are the standard errors. R is that of rounding to encoder
-counts, resolution^2/12, or taken from the third differences where no count is known. S is the one number to
-choose: it maximises the likelihood of the filter's innovations, evaluated with the filter's steady gain,
-which depends only on the ratio S h^5/R. The innovations then are the third differences of the positions, sent
-through the filter's own poles.
+S, and a position measured with noise of variance R (`data.kinematic_smoother`). A Kalman filter runs forwards
+and a Rauch-Tung-Striebel smoother backwards over it, so that every sample uses the past and the future; the
+smoother's covariances are the standard errors. R is that of rounding to encoder counts, resolution^2/12, or
+taken from the third differences where no count is known. S is the one number to choose: it maximises the
+likelihood of the filter's innovations, evaluated with the filter's steady gain, which depends only on the
+ratio S h^5/R. The innovations then are the third differences of the positions, sent through the filter's own
+poles.
 
 The run is taken apart at gaps (steps above three medians) and nothing is differentiated across one. Positions
 are scaled by the noise and times by the median step, so that the recursion is well conditioned in any units.
@@ -21,7 +17,7 @@ either: the standard errors are a model's, and a steady speed is better taken as
 
 Source: Rauch, Tung, Striebel, AIAA Journal 3 (1965); Bar-Shalom, Li, Kirubarajan, Estimation with
 Applications to Tracking and Navigation (2001), section 6.2.3 (the Wiener process acceleration model). The
-model and both recursions are filterpy's.
+model's matrices are filterpy's.
 """
 
 from __future__ import annotations

@@ -32,8 +32,9 @@ from data.names import shown
 from data.protocols import ProtocolName
 from data.recording import Axis, Recording
 from data.resolution import lattice_spacing
-from data.screening import Signals as Run
-from data.screening import require_count, require_samples, screen
+from data.screening.run import Run
+from data.screening.scale import require_count
+from data.screening.screen import require_samples, screen
 from data.signals import Clock, RigSignals, Signal, Signals, log_format
 from data.units import Quantity, known_unit, same_unit, si_word
 
@@ -382,8 +383,8 @@ def _drifting(door: _Door, header: NDArray[np.int64], log: NDArray[np.int64]) ->
     text = (
         f"the log times drift from the header stamps, which are the clock, by {found.total:.4g} s over the "
         f"run, {100 * found.rate:.3g} %: one of the two clocks runs wrong, and every speed, b and the "
-        "inertia by as much if it is the header's. Set `clock = \"log\"` in [signals] if the recorder's is "
-        "better"
+        "inertia by as much if it is the header's. "
+        'Set `clock = "log"` in [signals] if the recorder\'s is better'
     )
     return (Finding("E-CLOCK", Severity.WARN, text, door.log),)
 

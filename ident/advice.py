@@ -29,6 +29,7 @@ from ident.fit.confidence import quantile
 from ident.fit.fit_data import FitData
 from ident.fit.friction_fit import friction_torque, law_of, residuals
 from ident.fit.law_model import SIGN, Direction
+from ident.fit.slopes import slopes
 from ident.fit.weighting import Weighted
 from ident.model.friction import steepest_fall_factor
 
@@ -42,7 +43,6 @@ SLOW_ENOUGH: Final = 0.3  # of v_s: slower still is not asked for
 PLAUSIBLE: Final = (-1.4, -0.7, 0.0, 0.7, 1.4)  # standard errors of log v_s that are averaged over
 LARGEST_DOUBT: Final = 1.0  # of log v_s that is averaged over
 NOTHING_KNOWN: Final = 3.0  # standard deviation of log of a parameter before any data
-STEP: Final = 1e-5  # of a derivative, in parts
 RAMP_TIME: Final = 20.0  # [s] to F_s, where no ramp was recorded
 
 
@@ -204,18 +204,13 @@ def _derivative(
     """Derivatives (n, p) of a function of the values, with respect to the free ones in parts of their
     size.
     """
-    columns = []
-    for name in free:
-        step = STEP * _size(values, name)
-        ahead, behind = (function({**values, name: values[name] + off}) for off in (step, -step))
-        columns.append((ahead - behind) / (2 * STEP))
-    return np.column_stack(columns)
+    return slopes(function, values, free) * [_size(values, name) for name in free]
 
 
 def _size(values: Mapping[str, float], name: str) -> float:
     """A parameter's own size; a Stribeck torque or damping that ended at 0 is felt as F_c is."""
-    if values[name] > 0.0:
-        return values[name]
+    if values[name] != 0.0:
+        return abs(values[name])
     direction = name.partition("_")[0]
     return values.get(f"{direction}_coulomb_torque", 1.0) or 1.0
 

@@ -80,9 +80,8 @@ class IdentifiedRobot:
     notes: tuple[Finding, ...]
     covariance: Covariance
     inertia_sources: Mapping[str, Estimate] = field(default_factory=dict)  # by protocol, for comparison
-    profiles: Mapping[str, ProfilePoints] = field(
-        default_factory=dict
-    )  # named as `covariance`, and 'mean. ...'
+    # Named as `covariance`, and 'mean. ...'.
+    profiles: Mapping[str, ProfilePoints] = field(default_factory=dict)
     axis: str = "rotary"
     simulated: bool = False
 

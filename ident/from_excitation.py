@@ -13,9 +13,14 @@ from ident.estimate import Covariance, Estimate, IdentifiedRobot, RunUse
 from ident.evidence.gathering import Evidence, IdentificationError, log_findings, run_uses
 from ident.excitation.excited_law import ExcitedLaw
 from ident.excitation.report import report
-from ident.fit.excitation_parameters import compare_inertia, excitation_parameters, excited_inertia
+from ident.fit.disagreement import inertia_disagreement
+from ident.fit.excitation_parameters import excitation_parameters, excited_inertia
 from ident.fit.parameters import UNITS
 from ident.identified import Identification
+
+_CAUSE = (
+    "a delay, a flexible link or friction that varies with place would do it. Both stand in inertia_sources."
+)
 
 
 def from_excitation(
@@ -38,7 +43,8 @@ def from_excitation(
     if evidence.response is not None:
         unit = UNITS[axis]["inertia"]
         sources["frequency_response"] = Estimate(evidence.response.inertia, unit, evidence.response.stderr)
-        notes += compare_inertia(values.inertia, sources["frequency_response"], "frequency response", unit)
+        response = ("frequency response", sources["frequency_response"])
+        notes += inertia_disagreement(("excitation", values.inertia), response, unit=unit, cause=_CAUSE)
     held_out = (
         "" if excited.held_out is None else f" It predicts held-out torque to {100 * excited.held_out:.2f} %."
     )
@@ -81,7 +87,8 @@ def with_excitation(found: Identification, excited: ExcitedLaw | str) -> Identif
         matrix[0, 0], matrix[1:, 1:] = inertia.stderr**2, covariance.matrix
         covariance = Covariance(("inertia", *covariance.names), matrix)
     else:
-        notes += compare_inertia(inertia, robot.inertia, "the other logs", unit)
+        others = ("the other logs", robot.inertia)
+        notes += inertia_disagreement(("excitation", inertia), others, unit=unit, cause=_CAUSE)
     robot = replace(
         robot,
         inertia=chosen,

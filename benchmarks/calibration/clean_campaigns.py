@@ -20,7 +20,7 @@ import numpy as np
 from data.instruments import Encoder, TorqueChannel
 from data.protocols import ProtocolName
 from data.recording import Axis, FloatArray
-from data.screening import Signals
+from data.screening.run import Run
 from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.published import asymmetric_robot
 from ident.model.robot import OneLinkRobot
@@ -84,11 +84,9 @@ class Rig:
         tones = MultisineSettings(highest=min(40.0, 0.2 * rate), periods=3, realisations=3)
         return VirtualRig(robot=robot, sample_period=self.period, multisine=tones)
 
-    def logged(
-        self, log: str, protocol: ProtocolName, motion: Motion, generator: np.random.Generator
-    ) -> Signals:
+    def logged(self, log: str, protocol: ProtocolName, motion: Motion, generator: np.random.Generator) -> Run:
         """What the instruments make of a motion."""
-        return Signals(
+        return Run(
             log=log,
             protocol=protocol,
             time=self.period * np.arange(motion.position.size, dtype=np.float64),
@@ -104,18 +102,18 @@ class Campaign:
     """A rig and its logs in SI, not yet screened."""
 
     rig: Rig
-    logs: tuple[Signals, ...]
+    logs: tuple[Run, ...]
 
-    def of(self, protocol: ProtocolName) -> tuple[Signals, ...]:
+    def of(self, protocol: ProtocolName) -> tuple[Run, ...]:
         """The logs of one protocol."""
         return tuple(log for log in self.logs if log.protocol == protocol)
 
-    def without(self, logs: Sequence[Signals]) -> Campaign:
+    def without(self, logs: Sequence[Run]) -> Campaign:
         """The same campaign less some logs."""
         names = {log.log for log in logs}
         return replace(self, logs=tuple(log for log in self.logs if log.log not in names))
 
-    def with_log(self, changed: Signals) -> Campaign:
+    def with_log(self, changed: Run) -> Campaign:
         """The same campaign with the log of that name changed."""
         return replace(self, logs=tuple(changed if log.log == changed.log else log for log in self.logs))
 
@@ -188,7 +186,7 @@ def _steepest(robot: OneLinkRobot) -> float:
 
 def steady_log(
     rig: Rig, speed: float, generator: np.random.Generator, *, duration: float | None = None, name: str = ""
-) -> Signals:
+) -> Run:
     """A constant speed, held by the loop on a fine encoder, else imposed; the slower, the longer."""
     if duration is None:
         scale = rig.velocity
@@ -229,7 +227,7 @@ def ramp_log(
     ramps: int = 3,
     limit: float = math.inf,
     name: str = "",
-) -> Signals:
+) -> Run:
     """Ramps from rest at a rate [N m/s] that carries the direction."""
     motion = play_ramps(
         rig.bench(limit),
@@ -241,7 +239,7 @@ def ramp_log(
     return rig.logged(name or f"breakaway/{rate:.4g}.csv", "breakaway", motion, generator)
 
 
-def multisine_logs(rig: Rig, generator: np.random.Generator) -> tuple[Signals, ...]:
+def multisine_logs(rig: Rig, generator: np.random.Generator) -> tuple[Run, ...]:
     """Multisines on a bias speed, each of other phases."""
     return tuple(
         rig.logged(f"frf/{run.label}.csv", "frequency_response", run.play(generator), generator)

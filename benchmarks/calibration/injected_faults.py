@@ -28,7 +28,7 @@ from benchmarks.calibration.clean_campaigns import (
 )
 from data.findings import Severity
 from data.recording import FloatArray
-from data.screening import Signals
+from data.screening.run import Run
 from ident.model.friction import StribeckCurve, StribeckFriction
 from ident.model.robot import OneLinkRobot
 from ident.response import TorqueRipple
@@ -48,11 +48,11 @@ class Injected:
     also: tuple[str, ...] = ()  # codes that may be withheld or refused beside it
 
 
-def _one(log: Signals, rig: Rig, *severities: Severity, stage: Stage = "log") -> Injected:
+def _one(log: Run, rig: Rig, *severities: Severity, stage: Stage = "log") -> Injected:
     return Injected(Campaign(rig, (log,)), severities, stage)
 
 
-def any_log(rig: Rig, generator: Generator) -> Signals:
+def any_log(rig: Rig, generator: Generator) -> Run:
     """A log of any protocol."""
     kind = generator.integers(4)
     if kind == 0:
@@ -62,7 +62,7 @@ def any_log(rig: Rig, generator: Generator) -> Signals:
     return _fast_log(rig, generator)
 
 
-def _fast_log(rig: Rig, generator: Generator, *, duration: float = 2.0) -> Signals:
+def _fast_log(rig: Rig, generator: Generator, *, duration: float = 2.0) -> Run:
     """A constant speed between v_s and 30 v_s."""
     speed = float(generator.choice([-1.0, 1.0])) * rig.velocity * 30.0 ** generator.uniform(0.1, 1.0)
     return steady_log(rig, speed, generator, duration=duration)
@@ -169,7 +169,7 @@ def saturation(generator: Generator) -> Injected:
     return _one(replace(log, torque=torque), declared, WARN)
 
 
-def _held(log: Signals) -> Signals:
+def _held(log: Run) -> Run:
     """A log of ramps with each largest torque held three times as long, at rest."""
     size = np.abs(log.torque)
     often = np.where(size == size.max(), 3, 1)
@@ -382,7 +382,7 @@ def at_bound(generator: Generator) -> Injected:
     rig = whole.rig
     loss = generator.uniform(0.15, 0.3)
 
-    def falling(log: Signals) -> Signals:
+    def falling(log: Run) -> Run:
         if log.protocol != "constant_velocity":
             return log
         part = abs(_way(log) / (log.time[-1] - log.time[0])) / (30.0 * rig.velocity)
@@ -490,14 +490,14 @@ def _alike(rig: Rig) -> Rig:
     return replace(rig, robot=rig.robot.mean())
 
 
-def _way(log: Signals) -> float:
+def _way(log: Run) -> float:
     """Signed travel [rad]."""
     return float(log.position[-1] - log.position[0])
 
 
 def _everywhere(
     whole: Campaign,
-    change: Callable[[Signals], Signals],
+    change: Callable[[Run], Run],
     *severities: Severity,
     also: tuple[str, ...] = (),
 ) -> Injected:

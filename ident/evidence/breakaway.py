@@ -24,14 +24,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data.recording import FloatArray, Recording
-from ident.evidence.segmentation import Stretch, grain, slow_spans, stretches
+from ident.evidence.segmentation import AT_LIMIT, Stretch, grain, slow_spans, stretches
 
 SUSTAINED_COUNTS = 20.0
 ONSET_COUNTS = 3.5  # the first reading beyond is the onset
 LEAST_SAMPLES = 12  # of a ramp
 STRAIGHT = 0.001  # part of the torque by which a ramp may bend off its line
 KEPT = 0.7  # part of the longest straight stretch that the line goes through
-AT_LIMIT = 0.99  # part of the torque limit
 FLAT = 0.3  # part of the band next to the log's largest torque by which a flat top may rise
 
 

@@ -29,7 +29,7 @@ import numpy as np
 from data.protocols import ProtocolName
 from data.recording import FloatArray, Recording
 from ident.evidence.hunting import Swing, swing
-from ident.evidence.segmentation import Stretch, grain, plateaus, rests, stretches
+from ident.evidence.segmentation import AT_LIMIT, Stretch, grain, plateaus, rests, stretches
 
 LEAST_COUNTS = 20.0
 BLOCKS = 20  # a window is judged in twentieths
@@ -42,7 +42,6 @@ SPEED_DRIFT = 0.03  # part of the speed by which it may change over a run
 TORQUE_DRIFT = 0.25  # part of the torque: a place may change it by as much
 CLEAR = 5.0  # standard errors of a slope that is one
 STRAIGHT = 0.8  # part of the way between two rests that a constant speed makes at least
-AT_LIMIT = 0.99  # part of the torque limit
 LIMITED_SHARE = 0.02
 
 

@@ -17,13 +17,14 @@ from ident.evidence.frequency_response import FrequencyInertia, frequency_inerti
 from ident.evidence.friction_map import SteadyRun, steady_runs
 from ident.evidence.hunting import SAMPLES, hunts, sensor_noise
 from ident.evidence.momentum import Momentum, momentum
-from ident.evidence.position_ripple import Wave, find_waves, traces_of
+from ident.evidence.position_ripple import Wave, find_waves
 from ident.evidence.ripple_correction import (
     corrected_motions,
     corrected_runs,
     corrected_starts,
     without_wave_scatter,
 )
+from ident.evidence.traces import traces_of
 
 NEAR = 3.0  # ratio of speeds within which friction is of one size
 ABSURD = 50.0  # ratio of two torques, or two inertias, that ought to be of one size

@@ -24,6 +24,7 @@ MOST_KNOTS = 4000  # block means of the position that stand for a log, however l
 BEND = 0.01  # largest deviation from the chord, in parts of the travel
 REST_TRAVEL = 3.0  # grains that a link at rest may show
 SLOW = 0.02  # part of the fastest speed of a breakaway log
+AT_LIMIT = 0.99  # part of the torque limit, from which on the torque is at it
 LEAST_SHARE = 0.2  # of the typical plateau's duration or travel: less is a transition
 
 

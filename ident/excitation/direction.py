@@ -34,14 +34,9 @@ def position_step(position: FloatArray, resolution: float | None) -> float:
     return max(1.01 * (resolution or 0.0), NOISE * position_noise(position), rounding, 1e-300)
 
 
+@owning
 def direction_of_motion(position: FloatArray, step: float) -> tuple[FloatArray, NDArray[np.int64]]:
     """Direction (n,), +1 or -1, and dwell (n,) [samples], the time that the step at each sample takes."""
-    direction, dwell = _directions(position, step)
-    return direction, dwell
-
-
-@owning
-def _directions(position: FloatArray, step: float) -> tuple[FloatArray, NDArray[np.int64]]:
     n = position.size
     direction, dwell = np.ones(n), np.zeros(n, dtype=np.int64)
     low = high = 0  # the extremes so far, until the first motion says which way it goes

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from data.recording import FloatArray, Recording
-from data.screening import GAP
+from data.screening.clock import GAP
+from data.screening.torque import AT_LIMIT
 
 JITTER = 0.01  # of a step, below which samples count as evenly spaced
 FEWEST = 64  # samples of a span
@@ -65,9 +66,5 @@ def _span(recording: Recording, first: int, past: int, period: float) -> Span:
 
 def _saturated(recording: Recording) -> NDArray[np.bool_]:
     """Samples at the torque's limit: the declared one, or the flat top that the screening found."""
-    size = np.abs(recording.torque)
-    if recording.torque_limit is not None:
-        return size >= 0.999 * recording.torque_limit
-    if any(finding.code == "E-SAT" for finding in recording.findings):
-        return size >= float(size.max())
-    return np.zeros(size.size, dtype=np.bool_)
+    limit = np.inf if recording.torque_limit is None else recording.torque_limit
+    return np.asarray(np.abs(recording.torque) >= AT_LIMIT * limit)

@@ -2,7 +2,7 @@ r"""When the torque of a log acts: held from its stamp, or measured at it, or la
 
 Half a sample is enough to move b: the torque of an inertia that acts d later adds J d times the jerk, which
 in a swing is in phase with the speed. To first order u(t) = (X p)(t + d) = X p + d (X p)', so that d is one
-more linear Friction whose reversals are no jumps imitates a delay too, but another one in each
+more linear parameter. Friction whose reversals are no jumps imitates a delay too, but another one in each
 band. The log is therefore taken at its word, the torque of a row at the row's time, unless two bands, the
 whole and its lower half, both lie nearer to the other convention; and a delay beyond the conventions is used
 only where both bands say the same.

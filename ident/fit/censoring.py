@@ -11,15 +11,16 @@ from dataclasses import replace
 
 from ident.estimate import Estimate
 from ident.evidence.gathering import Evidence
-from ident.fit.law_model import SIGN, LawModel, LawName
+from ident.fit.law_model import LawModel, LawName
 from ident.fit.parameters import Parameters
+from ident.fit.withholding import where
 
 
 def least_static_torques(evidence: Evidence, model: LawModel) -> Mapping[LawName, float]:
     """The bound on F_s [N m] of each law that has no breakaway but censored ones."""
     bounds: dict[LawName, float] = {}
     for law in model.laws:
-        ways = [SIGN[way] for way in model.directions if model.law_of(way) == law]
+        ways = model.signs(law)
         censored = [s for s in evidence.starts if s.direction in ways and s.is_censored]
         if censored and not any(start.direction in ways for start in evidence.used_starts):
             bounds[law] = max(abs(start.torque) for start in censored)
@@ -49,9 +50,8 @@ def with_bounds(values: Parameters, evidence: Evidence) -> Parameters:
 
 
 def _bounded(law: LawName, bound: float, unit: str) -> Estimate:
-    where = "both directions" if law == "mean" else f"{law} direction"
     text = (
-        f"E-SAT: {where}: every ramp ended at the torque limit: F_s >= {bound:.4g} {unit}, not a number. "
-        "Raise the limit, or ramp where there is less friction."
+        f"E-SAT: {where(law)}: every ramp ended at the torque limit: F_s >= {bound:.4g} {unit}, not a "
+        "number. Raise the limit, or ramp where there is less friction."
     )
     return Estimate(None, unit, interval95=(bound, None), withheld=text)

@@ -17,16 +17,11 @@ from data.recording import Axis
 from ident.estimate import CURVE_PARAMETERS, Covariance, Estimate
 from ident.excitation.excited_law import ExcitedLaw
 from ident.fit.confidence import quantile, symmetric
+from ident.fit.disagreement import asymmetry
 from ident.fit.law_model import DIRECTIONS, Direction
-from ident.fit.one_stage import COMPATIBLE
-from ident.fit.parameters import UNITS
+from ident.fit.parameters import NO_OFFSET, ONE_LAW, UNITS
 
 POOR: Final = 0.1  # relative error of the torque above which the law does not explain the motion
-ONE_LAW: Final = "one law for both directions was fitted: see mean"
-NO_OFFSET: Final = (
-    "E-OFFSET: no torque-driven experiment separates a constant offset from an asymmetry of friction; the "
-    "laws are those of the torque as logged. A zero-torque reference would tell."
-)
 STRIBECK_PART: Final = ("static_torque", "stribeck_velocity", "stribeck_shape")
 
 
@@ -60,9 +55,11 @@ def excitation_parameters(found: ExcitedLaw, *, axis: Axis) -> ExcitationParamet
             findings += own
         mean = {name: _mean(name, curves, covariance, found.dof, units[name]) for name in CURVE_PARAMETERS}
         offset = Estimate(None, units["torque_offset"], withheld=NO_OFFSET)
+        pair = [curves[direction]["coulomb_torque"] for direction in DIRECTIONS]
+        findings += asymmetry(pair[0], pair[1], unit=units["torque_offset"])
     laws: dict[str, Mapping[str, Estimate]] = {"mean": mean, **{key: curves[key] for key in DIRECTIONS}}
     kept = _kept(covariance, inertia, laws)
-    return ExcitationParameters(inertia, curves, mean, offset, kept, (*findings, *_findings(found, units)))
+    return ExcitationParameters(inertia, curves, mean, offset, kept, (*findings, *_findings(found)))
 
 
 def excited_inertia(found: ExcitedLaw, *, unit: str) -> tuple[Estimate, list[Finding]]:
@@ -76,22 +73,6 @@ def excited_inertia(found: ExcitedLaw, *, unit: str) -> tuple[Estimate, list[Fin
     )
     finding = Finding("E-BOUND", Severity.WITHHOLD, text)
     return Estimate(None, unit, withheld=f"E-BOUND: {text}"), [finding]
-
-
-def compare_inertia(excited: Estimate, other: Estimate, source: str, unit: str) -> list[Finding]:
-    """A finding where the inertia from excitation and that from another source disagree."""
-    if excited.value is None or other.value is None:
-        return []
-    error = float(np.hypot(excited.stderr or 0.0, other.stderr or 0.0))
-    distance = abs(excited.value - other.value)
-    if distance <= COMPATIBLE * error:
-        return []
-    text = (
-        f"the inertia from excitation is {excited.value:.4g} and from {source} {other.value:.4g} {unit}, "
-        f"{distance / error:.1f} standard errors apart: a scale of the torque that changes, a delay, a "
-        "flexible link or friction that varies with place would do it. Both stand in inertia_sources."
-    )
-    return [Finding("E-LACKOFFIT", Severity.WARN, text)]
 
 
 def _estimate(found: ExcitedLaw, name: str, unit: str, *, least: float | None = 0.0) -> Estimate:
@@ -204,8 +185,8 @@ def _kept(
     return Covariance(names, covariance.matrix[np.ix_(where, where)])
 
 
-def _findings(found: ExcitedLaw, units: Mapping[str, str]) -> list[Finding]:
-    findings = [*_law_findings(found, units), *_bend_findings(found)]
+def _findings(found: ExcitedLaw) -> list[Finding]:
+    findings = [*_law_findings(found), *_bend_findings(found)]
     timing = found.timing
     if not timing.consistent and np.isfinite(timing.stderr):
         text = (
@@ -231,7 +212,7 @@ def _findings(found: ExcitedLaw, units: Mapping[str, str]) -> list[Finding]:
     return findings
 
 
-def _law_findings(found: ExcitedLaw, units: Mapping[str, str]) -> list[Finding]:
+def _law_findings(found: ExcitedLaw) -> list[Finding]:
     findings = []
     if found.linear.relative_error > POOR and found.whole is None:
         text = (
@@ -240,17 +221,6 @@ def _law_findings(found: ExcitedLaw, units: Mapping[str, str]) -> list[Finding]:
             "with position or temperature."
         )
         findings.append(Finding("E-LACKOFFIT", Severity.WARN, text))
-    if found.law == "each":
-        forward, back = (found.values[f"{d}_coulomb_torque"] for d in DIRECTIONS)
-        ahead, behind = (found.stderr(f"{d}_coulomb_torque") for d in DIRECTIONS)
-        error = float(np.hypot(ahead, behind))
-        if abs(forward - back) > 3.0 * error:
-            text = (
-                f"F_c differs by {forward - back:.3g} {units['torque_offset']} between the directions: an "
-                f"asymmetry of friction, or an actuator offset of {0.5 * (forward - back):.3g}; no "
-                "torque-driven experiment separates them."
-            )
-            findings.append(Finding("E-OFFSET", Severity.WARN, text))
     return findings
 
 
@@ -262,7 +232,7 @@ def _bend_findings(found: ExcitedLaw) -> list[Finding]:
     text = (
         f"least squares and instruments from the reference differ by {abs(comparison.distance[worst]):.1f} "
         f"errors of the difference in {comparison.fit.names[worst]}: noise comes back through the loop, or "
-        "the reference is not what the "
-        "link follows. The interval holds both. Use a finer encoder or a larger motion."
+        "the reference is not what the link follows. The interval holds both. Use a finer encoder or a "
+        "larger motion."
     )
     return [Finding("E-SPEEDERR", Severity.WARN, text)]

@@ -25,9 +25,10 @@ import numpy as np
 
 from data.recording import FloatArray
 from ident.fit.fit_data import LARGEST_SHAPE, LEAST_SHAPE, FitData
-from ident.fit.law_model import BLOCK, DIRECTIONS, SIGN, Direction, LawModel, LawName
+from ident.fit.law_model import BLOCK, SIGN, Direction, LawModel, LawName
 from ident.fit.normal_equations import OFFSET, chi_square
 from ident.fit.refits import refit_each
+from ident.fit.slopes import slopes
 
 GRID = 40  # Stribeck velocities tried as starts in each law
 STARTS = 8  # polished by the full fit
@@ -105,15 +106,8 @@ def in_order(
 
 
 def jacobian(data: FitData, values: Mapping[str, float], free: Sequence[str]) -> FloatArray:
-    """Slope of the residuals with the free parameters (N, p) [1/SI], by central differences."""
-    columns = []
-    for name in free:
-        step = 1e-6 * max(abs(values[name]), 1e-9 * max(values.values()))
-        if name.endswith("stribeck_velocity"):
-            step = 1e-6 * values[name]
-        ahead, behind = (residuals(data, {**values, name: values[name] + off}) for off in (step, -step))
-        columns.append((ahead - behind) / (2 * step))
-    return np.column_stack(columns)
+    """Slope of the residuals with the free parameters (N, p) [1/SI]."""
+    return slopes(lambda changed: residuals(data, changed), values, free)
 
 
 def fit_friction(data: FitData, *, start: FrictionFit | None = None) -> FrictionFit:
@@ -128,7 +122,7 @@ def fit_friction(data: FitData, *, start: FrictionFit | None = None) -> Friction
         points, cost = _refitted(data, shaped)
     order = np.argsort(cost, kind="stable")
     points, cost = points[order], cost[order]
-    values = _named(data, points[0])
+    values = named(data, points[0])
     return FrictionFit(
         model=data.model,
         values=values,
@@ -202,7 +196,8 @@ def _straightened(data: FitData, points: FloatArray) -> FloatArray:
     return straight
 
 
-def _named(data: FitData, x: FloatArray) -> dict[str, float]:
+def named(data: FitData, x: FloatArray) -> dict[str, float]:
+    """The values by name of compiled parameters (p,), in which v_s is a logarithm."""
     return {
         name: float(np.exp(value) if name.endswith("stribeck_velocity") else value)
         for name, value in zip(data.model.names, x, strict=True)
@@ -225,7 +220,7 @@ def _covariance(data: FitData, x: FloatArray) -> FloatArray:
     chi_square(data.problem, x, data.work.h, data.work.g, 0)
     lower = np.tril(data.work.h[0])
     free = data.box.free
-    values = _named(data, x)
+    values = named(data, x)
     slope = np.array(
         [values[name] if name.endswith("stribeck_velocity") else 1.0 for name in data.model.names]
     )
@@ -277,7 +272,7 @@ def _ranked(data: FitData, law: LawName, blank: FloatArray) -> list[FloatArray]:
     """Blocks of one law: the best linear law of runs and breakaways for each v_s, best minima first."""
     place = data.model.place(law)
     velocity = place + BLOCK.index("stribeck_velocity")
-    own = np.isin(data.run_direction, [SIGN[d] for d in DIRECTIONS if data.model.law_of(d) == law])
+    own = np.isin(data.run_direction, data.model.signs(law))
     moving = data.speed[own]
     steady = replace(data, momenta=(), whitening=())
     largest = float(np.max(np.abs(data.torque[own])))
@@ -324,5 +319,5 @@ def _other_minimum(data: FitData, points: FloatArray, cost: FloatArray) -> Mappi
             velocity = place + BLOCK.index("stribeck_velocity")
             flat = points[0, place + BLOCK.index("stribeck_torque")] == 0.0
             if abs(other[velocity] - points[0, velocity]) > APART and not flat:
-                return _named(data, other)
+                return named(data, other)
     return None

@@ -20,6 +20,11 @@ BLOCK: Final = ("coulomb_torque", "stribeck_torque", "stribeck_velocity", "visco
 COMMON: Final = ("inertia", "torque_offset")
 
 
+def direction_of(sign: float) -> Direction:
+    """The direction of a signed velocity, torque or +1 and -1."""
+    return "positive" if sign > 0 else "negative"
+
+
 @dataclass(frozen=True)
 class LawModel:
     """The laws, those whose beta is free, and those that are lines."""
@@ -48,6 +53,10 @@ class LawModel:
         if self.has_offset:
             return "mean"
         return direction if direction in self.laws else None
+
+    def signs(self, law: LawName) -> tuple[int, ...]:
+        """+1, -1 or both: the directions that a law holds in."""
+        return tuple(SIGN[direction] for direction in self.directions if self.law_of(direction) == law)
 
     def place(self, law: LawName) -> int:
         """Where the block of a law begins among `names`."""

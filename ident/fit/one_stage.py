@@ -22,12 +22,13 @@ from ident.evidence.gathering import Evidence
 from ident.fit.assumptions import Assumptions
 from ident.fit.censoring import with_bounds
 from ident.fit.confidence import quantile
+from ident.fit.disagreement import asymmetry, inertia_disagreement
 from ident.fit.friction_fit import polished
-from ident.fit.law_model import DIRECTIONS, Direction, LawModel, LawName
+from ident.fit.law_model import DIRECTIONS, Direction, LawModel, LawName, direction_of
 from ident.fit.law_shape import chosen_shape, shape_findings
 from ident.fit.missing_direction import Missing, missing_directions, of_directions
 from ident.fit.one_law import one_law_findings
-from ident.fit.parameters import UNITS, Parameters, parameters
+from ident.fit.parameters import NO_INERTIA, UNITS, Parameters, parameters
 from ident.fit.ramp_rates import trend_finding
 from ident.fit.second_minimum import minimum_findings, without_disputed
 from ident.fit.small_samples import certainty
@@ -35,7 +36,10 @@ from ident.fit.stribeck_effect import where_it_shows
 from ident.fit.weighting import Weighted, settle, with_inertia
 from ident.fit.withholding import require_enough
 
-COMPATIBLE = 3.0  # standard errors between two sources of one value
+_CAUSE = (
+    "a flexible link or friction that varies with place would do it. The frequency response is the one "
+    "reported."
+)
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,10 @@ def explain(evidence: Evidence, *, axis: Axis, assumptions: Assumptions) -> Expl
         else:
             datum = (evidence.response.inertia, evidence.response.stderr)
             weighted = with_inertia(evidence, weighted, datum, dof=evidence.response.dof)
-        findings += _disagreement(sources, unit)
+        if "breakaway" in sources:
+            findings += inertia_disagreement(
+                ("breakaway", sources["breakaway"]), ("frequency_response", response), unit=unit, cause=_CAUSE
+            )
     fit, report = polished(weighted.data, weighted.fit)
     values = parameters(weighted.data, fit, axis=axis, missing=missing.reasons)
     weighted = replace(weighted, fit=values.fit)
@@ -86,7 +93,7 @@ def explain(evidence: Evidence, *, axis: Axis, assumptions: Assumptions) -> Expl
     findings += one_law_findings(evidence, model)
     if weighted.data.trend is not None:
         findings.append(trend_finding(weighted.data.trend, unit=UNITS[axis]["static_torque"]))
-    findings += [*values.findings, *minimum_findings(values), *_offset_finding(values, axis)]
+    findings += [*values.findings, *minimum_findings(values), *_asymmetry(values, axis)]
     report = report if choice is None else f"{report}\n\n{choice.table}"
     return Explained(evidence, weighted, values, sources, report, tuple(findings))
 
@@ -107,7 +114,7 @@ def _inertia_of(weighted: Weighted, unit: str) -> Estimate:
     place = weighted.fit.free.index("inertia")
     error = float(np.sqrt(found.covariance[place, place]))
     if not (value > 0 and np.isfinite(error)):
-        return Estimate(None, unit, withheld="E-BOUND: the inertia ended at its bound 0; record a multisine.")
+        return Estimate(None, unit, withheld=NO_INERTIA)
     reach = quantile(found.dof(own)) * error
     return Estimate(value, unit, error, (max(value - reach, 0.0), value + reach))
 
@@ -117,7 +124,7 @@ def _response_source(
 ) -> tuple[Estimate, Finding | None]:
     """The inertia of the frequency response; withheld where its lowest speed lies in the Stribeck range."""
     for fit in response.fits:
-        velocity = _stribeck_range(weighted, "positive" if fit.bias_speed > 0 else "negative")
+        velocity = _stribeck_range(weighted, direction_of(fit.bias_speed))
         if fit.lowest_speed >= LEAST_SPEED_RATIO * velocity:
             continue
         text = (
@@ -148,38 +155,6 @@ def _stribeck_range(weighted: Weighted, direction: Direction) -> float:
     )
 
 
-def _disagreement(sources: dict[str, Estimate], unit: str) -> list[Finding]:
-    values = [(name, source.value, source.stderr) for name, source in sources.items()]
-    known = [(name, value, error) for name, value, error in values if value is not None and error is not None]
-    if len(known) < 2:
-        return []
-    (one, first, first_error), (two, second, second_error) = known
-    distance = abs(first - second) / float(np.hypot(first_error, second_error))
-    if distance <= COMPATIBLE:
-        return []
-    text = (
-        f"the inertia from {one} is {first:.4g} and from {two} {second:.4g} {unit}, {distance:.1f} standard "
-        "errors "
-        "apart: a scale of the torque that changes, a flexible link or friction that varies with place "
-        "would do it. "
-        "The frequency response is the one reported."
-    )
-    return [Finding("E-LACKOFFIT", Severity.WARN, text)]
-
-
-def _offset_finding(values: Parameters, axis: Axis) -> list[Finding]:
-    pair = [values.curves[direction]["coulomb_torque"] for direction in DIRECTIONS]
-    if any(estimate.value is None or estimate.stderr is None for estimate in pair):
-        return []
-    forward, backward = ((e.value or 0.0, e.stderr or 0.0) for e in pair)
-    difference, error = forward[0] - backward[0], float(np.hypot(forward[1], backward[1]))
-    if abs(difference) <= COMPATIBLE * error:
-        return []
-    text = (
-        f"F_c differs by {difference:.3g} {UNITS[axis]['torque_offset']} between the directions: an "
-        "asymmetry of "
-        f"friction, or an actuator offset of {0.5 * difference:.3g}; no torque-driven experiment separates "
-        "them. "
-        "The laws are those of the torque as logged."
-    )
-    return [Finding("E-OFFSET", Severity.WARN, text)]
+def _asymmetry(values: Parameters, axis: Axis) -> list[Finding]:
+    positive, negative = (values.curves[direction]["coulomb_torque"] for direction in DIRECTIONS)
+    return asymmetry(positive, negative, unit=UNITS[axis]["torque_offset"])

@@ -39,12 +39,13 @@ UNITS: Mapping[Axis, Mapping[str, str]] = {
         "torque_offset": "N",
     },
 }
-_ONE_LAW = "one law for both directions was fitted: see mean"
-_NO_OFFSET = (
+ONE_LAW = "one law for both directions was fitted: see mean"
+NO_OFFSET = (
     "E-OFFSET: no torque-driven experiment separates a constant offset from an asymmetry of friction; the "
     "laws are those of the torque as logged. A zero-torque reference would tell, or --one-law, if one law "
     "holds for both directions."
 )
+NO_INERTIA = "E-BOUND: the inertia ended at its bound 0; record a multisine."
 _ONE_WAY = "E-DIRECTION: a torque offset shows only as a difference between two directions."
 
 
@@ -90,7 +91,7 @@ def parameters(
         findings += own
     curves: dict[Direction, Mapping[str, Estimate]] = {}
     for direction in DIRECTIONS:
-        why = _ONE_LAW if data.model.has_offset else (missing or {}).get(direction, "")
+        why = ONE_LAW if data.model.has_offset else (missing or {}).get(direction, "")
         lacking = {name: Estimate(None, units[name], withheld=why) for name in CURVE_PARAMETERS}
         curves[direction] = laws.get(direction, lacking)
     mean = laws.get("mean") or {
@@ -237,7 +238,7 @@ def _inertia(
         )
     value, error = fit.values["inertia"], float(stderr["inertia"])
     if not (value > 0 and np.isfinite(error)):
-        return Estimate(None, unit, withheld="E-BOUND: the inertia ended at its bound 0; record a multisine.")
+        return Estimate(None, unit, withheld=NO_INERTIA)
     ends = _interval(found, "inertia")
     return Estimate(value, unit, error, (ends.low, ends.high))
 
@@ -247,6 +248,6 @@ def _offset(
 ) -> Estimate:
     if not fit.model.has_offset:
         both = len(fit.model.laws) == len(DIRECTIONS)
-        return Estimate(None, unit, withheld=_NO_OFFSET if both else _ONE_WAY)
+        return Estimate(None, unit, withheld=NO_OFFSET if both else _ONE_WAY)
     ends = _interval(found, "torque_offset")
     return Estimate(fit.values["torque_offset"], unit, stderr["torque_offset"], (ends.low, ends.high))

@@ -10,8 +10,7 @@ from data.recording import FloatArray
 from ident.fit.fit_data import FitData
 from ident.fit.friction_fit import FrictionFit, friction_torque, law_of
 from ident.fit.law_model import SIGN
-
-STEP = 1e-6  # of a derivative, in parts
+from ident.fit.slopes import slopes
 
 
 def measured(data: FitData) -> FloatArray:
@@ -43,12 +42,4 @@ def predicted(data: FitData, values: Mapping[str, float]) -> FloatArray:
 
 def gradient(data: FitData, fit: FrictionFit) -> FloatArray:
     """Derivatives of the predictions by the free parameters (n + m, p)."""
-    columns = []
-    largest = max(abs(value) for value in fit.values.values())
-    for name in fit.free:
-        step = STEP * max(abs(fit.values[name]), STEP * largest)
-        ahead, behind = (
-            predicted(data, {**fit.values, name: fit.values[name] + off}) for off in (step, -step)
-        )
-        columns.append((ahead - behind) / (2 * step))
-    return np.column_stack(columns)
+    return slopes(lambda changed: predicted(data, changed), fit.values, fit.free)

@@ -18,7 +18,7 @@ from data.recording import FloatArray
 from ident.estimate import ProfilePoints
 from ident.fit.confidence import Interval
 from ident.fit.fit_data import FitData
-from ident.fit.friction_fit import FrictionFit, fit_friction, vector
+from ident.fit.friction_fit import FrictionFit, fit_friction, named, vector
 from ident.fit.law_model import BLOCK, LawName
 from ident.fit.refits import BETTER, BOUND, MOST_POINTS, REACHED, profile_end, refit_each
 
@@ -48,11 +48,10 @@ def profiles(
     *,
     height: Callable[[Combination], float],
 ) -> tuple[FrictionFit, dict[str, Profile]]:
-    """Profiles of combinations whose parameters are all free; by name, with the fit that they belong to.
+    """Profiles of combinations whose parameters are all free; by name, with the fit that they belong to: the
+    one given, or a better one where a profile has led to it.
 
     `height` says by how much chi-square rises at the ends of a combination's interval.
-
-    That is the fit given, or a better one where a profile has led to it.
     """
     for _ in range(TRIALS):
         found: dict[str, Profile] = {}
@@ -89,9 +88,7 @@ def _profile(
             problem, best[0], cost[0], side * step, limit, height, box, work, x, memory
         )
         if ended == BETTER:
-            named = dict(zip(data.model.names, x, strict=True))
-            named |= {name: np.exp(value) for name, value in named.items() if name.endswith("velocity")}
-            begun = FrictionFit(data.model, named, fit.free, fit.covariance, cost[0], None)
+            begun = FrictionFit(data.model, named(data, x), fit.free, fit.covariance, cost[0], None)
             return Profile(_by_value(points), Interval(None, None)), fit_friction(data, start=begun)
         points.append(memory[:count].copy())
         closed = limit if ended == BOUND and known else None

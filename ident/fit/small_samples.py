@@ -31,9 +31,7 @@ from ident.fit.fit_data import FitData
 from ident.fit.friction_fit import FrictionFit, in_order, jacobian
 
 SLIGHT = 1e-4  # share of every datum's variance under which a spread plays no part
-LEAST = (
-    0.25  # information on a spread's relative error, of half a degree of freedom: less is none to expand in
-)
+LEAST = 0.25  # information on a spread's relative error, of half a degree of freedom: below, there is none
 DEPENDENT = 1e-10  # singular value, of the largest, below which slopes are dependent
 
 

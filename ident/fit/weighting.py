@@ -22,16 +22,13 @@ from ident.fit.friction_fit import (
     FrictionFit,
     fit_friction,
     friction_torque,
-    in_order,
-    jacobian,
-    residuals,
     start_inertia,
 )
-from ident.fit.law_model import SIGN, Direction, LawModel
+from ident.fit.law_model import SIGN, LawModel, direction_of
+from ident.fit.one_way_robot import robot_one_way
+from ident.fit.predictions import gradient, measured, predicted
 from ident.fit.ramp_rates import rate_trend
 from ident.fit.variance_model import Spread, averaged_out, members, spread_of, white_variance
-from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
-from ident.model.robot import OneLinkRobot
 from ident.response import breakaway_delay
 
 ROUNDS = 5  # of the steady runs alone
@@ -122,7 +119,7 @@ def _balanced_inertia(momenta: Sequence[Momentum], fit: FrictionFit, spread: Spr
     inertia = fit.values["inertia"]
     left = right = 0.0
     for motion in momenta:
-        law = fit.law("positive" if motion.direction > 0 else "negative")
+        law = fit.law(direction_of(motion.direction))
         whitening = _whitening(motion, inertia, spread, scale=1.0)
         gain = whitening @ motion.gain
         left += float(gain @ (whitening @ motion.residual(0.0, law)))
@@ -134,19 +131,6 @@ def _change(fit: FrictionFit, again: FrictionFit) -> float:
     """Largest change of a parameter from one fit to the next, in its standard errors."""
     change = np.array([again.values[name] - fit.values[name] for name in again.free])
     return float(np.max(np.abs(change) / np.sqrt(np.diag(again.covariance))))
-
-
-def _robot_one_way(fit: FrictionFit, direction: Direction) -> OneLinkRobot | None:
-    """A robot with the law of a direction both ways, where its values are a robot's; without Stribeck effect
-    where its law is a line.
-    """
-    coulomb, stribeck, velocity, damping, shape = fit.law(direction)
-    stribeck = 0.0 if fit.model.law_of(direction) in fit.model.lines else stribeck
-    try:
-        curve = StribeckCurve(coulomb + stribeck, coulomb, velocity, damping, shape)
-        return OneLinkRobot(fit.values["inertia"], StribeckFriction(curve, curve))
-    except ModelError:
-        return None
 
 
 def _first_data(evidence: Evidence, model: LawModel) -> FitData:
@@ -178,18 +162,11 @@ def _first_data(evidence: Evidence, model: LawModel) -> FitData:
 
 def _spread_of(evidence: Evidence, data: FitData, fit: FrictionFit) -> Spread:
     """The spreads that the residuals of a fit of steady runs and breakaways show."""
-    runs = data.torque.size
-    number = np.arange(runs + data.start_torque.size, dtype=np.float64)
-    order = in_order(data, runs=number[:runs], starts=number[runs:]).astype(int)
-    stderr = in_order(data, runs=data.run_stderr, starts=data.start_stderr)
-    residual = np.empty(order.size)
-    residual[order] = residuals(data, fit.values) * stderr
-    basis = np.empty((order.size, len(fit.free)))
-    basis[order] = jacobian(data, fit.values, fit.free) * stderr[:, None]
+    residual = measured(data) - predicted(data, fit.values)
     known = np.concatenate([_own_variance(evidence, data, fit), _start_variance(evidence, data, fit)])
     travel = np.array([run.travel for run in evidence.used_runs])
     groups = members(data.run_direction, data.start_direction)
-    return spread_of(residual, basis, known, groups, travel)
+    return spread_of(residual, gradient(data, fit), known, groups, travel)
 
 
 def _own_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatArray:
@@ -267,11 +244,11 @@ def law_slopes(data: FitData, fit: FrictionFit) -> FloatArray:
 
 def _onset_torque(starts: Sequence[Breakaway], fit: FrictionFit) -> tuple[FloatArray, FloatArray]:
     """Torque at the onset (m,) [N m], magnitudes, and the error that the delay may bring (m,)."""
-    robots = {direction: _robot_one_way(fit, direction) for direction in fit.model.directions}
+    robots = {direction: robot_one_way(fit, direction) for direction in fit.model.directions}
     torque, error = np.zeros(len(starts)), np.zeros(len(starts))
     for number, start in enumerate(starts):
         rate, torque[number] = abs(start.line.rate), abs(start.torque)
-        direction: Direction = "positive" if start.direction > 0 else "negative"
+        direction = direction_of(start.direction)
         robot = robots[direction]
         if robot is None:
             continue
@@ -303,7 +280,7 @@ def _motion_scale(momenta: Sequence[Momentum], fit: FrictionFit, spread: Spread)
     inertia = fit.values["inertia"]
     total, strayed, windows = 0.0, 0.0, 0
     for motion in momenta:
-        law = fit.law("positive" if motion.direction > 0 else "negative")
+        law = fit.law(direction_of(motion.direction))
         whitening = _whitening(motion, inertia, spread, scale=1.0)
         residual = whitening @ motion.residual(inertia, law)
         gain = whitening @ motion.gain

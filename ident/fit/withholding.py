@@ -18,14 +18,12 @@ from ident.evidence.gathering import Evidence, IdentificationError
 from ident.fit.confidence import Interval
 from ident.fit.fit_data import LARGEST_SHAPE, LEAST_SHAPE, FitData
 from ident.fit.friction_fit import FrictionFit
-from ident.fit.law_model import BLOCK, SIGN, LawModel, LawName
+from ident.fit.law_model import BLOCK, LawModel, LawName
 
 LEAST_SPEEDS = 3  # under v_s, and over 3 v_s
 LOOSE = 0.5  # relative half-width of an interval beyond which sparse speeds are believed no longer
 AT_BOUND = 1e-3  # part of the parameter's own error
 SPARE = 3  # least number of data beyond the free parameters
-
-
 _LINE = "; F_c and b are those of a line, F_s that of the breakaways"
 
 
@@ -54,7 +52,7 @@ def require_enough(evidence: Evidence, model: LawModel) -> None:
 
 def counted(evidence: Evidence, model: LawModel, law: LawName) -> tuple[int, int, int]:
     """How many steady runs, breakaways and parameters a law has, taken for a curve."""
-    signs = [SIGN[d] for d in model.directions if model.law_of(d) == law]
+    signs = model.signs(law)
     runs = sum(run.direction in signs for run in evidence.used_runs)
     starts = sum(start.direction in signs for start in evidence.used_starts)
     return runs, starts, len(BLOCK) - int(law not in model.free_shape) + int(model.has_offset)
@@ -147,7 +145,7 @@ def withheld(
 
 def _of(data: FitData, law: LawName, sign: NDArray[np.int64]) -> NDArray[np.bool_]:
     """Which of the data in directions `sign` (n,) a law holds for."""
-    return np.isin(sign, [SIGN[d] for d in data.model.directions if data.model.law_of(d) == law])
+    return np.isin(sign, data.model.signs(law))
 
 
 def _at_most(interval: Interval) -> str:

@@ -149,7 +149,7 @@ def _kept(data: FitData, kept: NDArray[np.bool_], logs: frozenset[str], evidence
 def _is_enough(data: FitData) -> bool:
     """Whether every law keeps more data than it has parameters, and runs among them in its directions."""
     for law in data.model.laws:
-        ways = [SIGN[way] for way in data.model.directions if data.model.law_of(way) == law]
+        ways = data.model.signs(law)
         runs = np.isin(data.run_direction, ways)
         starts = np.isin(data.start_direction, ways)
         free = sum(name.startswith(law) for name in data.free)

@@ -21,9 +21,8 @@ from ident.evidence.breakaway import Breakaway
 from ident.evidence.gathering import Evidence
 from ident.evidence.segmentation import grain
 from ident.fit.friction_fit import FrictionFit
-from ident.fit.law_model import Direction
-from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
-from ident.model.robot import OneLinkRobot
+from ident.fit.law_model import direction_of
+from ident.fit.one_way_robot import robot_one_way
 from ident.response import breakaway_delay, respond
 from ident.validation.held_out import CrossValidation
 
@@ -60,13 +59,13 @@ def _predicted(recording: Recording, start: Breakaway, fit: FrictionFit) -> Ramp
     """One motion; None where the fit is no robot's or the motion is too short."""
     past = min(start.end, start.onset + LONGEST)
     rate, period = abs(start.line.rate), recording.sample_period
-    direction: Direction = "positive" if start.direction > 0 else "negative"
-    own = _robot(fit, direction, static=None)
+    direction = direction_of(start.direction)
+    own = robot_one_way(fit, direction)
     if own is None or past - start.onset < 3:
         return None
     lead = rate * breakaway_delay(own, direction=direction, ramp_rate=rate, travel=start.travel)
     static = abs(start.torque) - lead
-    robot = _robot(fit, direction, static=static)
+    robot = robot_one_way(fit, direction, static_torque=static)
     if robot is None:
         return None
     late = (getattr(own.friction, direction).static_torque - static) / rate
@@ -100,18 +99,3 @@ def _along(recording: Recording, start: Breakaway, past: int) -> tuple[FloatArra
     even = np.arange(start.onset_time, time[-1], recording.sample_period)
     sample = np.clip(np.searchsorted(time, even, side="right") - 1, 0, time.size - 1)
     return time, displacement, np.asarray(start.direction * recording.torque[part][sample])
-
-
-def _robot(fit: FrictionFit, direction: Direction, *, static: float | None) -> OneLinkRobot | None:
-    """A robot with the law of a direction both ways, and another F_s if one is given and it has a Stribeck
-    effect.
-    """
-    coulomb, stribeck, velocity, damping, shape = fit.law(direction)
-    static = coulomb + stribeck if static is None else static
-    if fit.model.law_of(direction) in fit.model.lines:
-        static = coulomb
-    try:
-        curve = StribeckCurve(static, coulomb, velocity, damping, shape)
-        return OneLinkRobot(fit.values["inertia"], StribeckFriction(curve, curve))
-    except ModelError:
-        return None

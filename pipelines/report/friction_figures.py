@@ -21,10 +21,8 @@ from ident.model.friction import StribeckCurve
 from ident.model.robot import OneLinkRobot
 from pipelines.report.axis_units import units_of
 from pipelines.report.speed_axis import speed_axis
-from pipelines.report.style import BLUE, INK, VERMILLION, key, new_figure, styled, zero_lines
+from pipelines.report.style import DIRECTION_COLOUR, DIRECTION_NAME, INK, key, new_figure, styled, zero_lines
 
-_COLOUR: Final = {1: BLUE, -1: VERMILLION}
-_NAME: Final = {1: "$\\dot{q} > 0$", -1: "$\\dot{q} < 0$"}
 _STRIBECK_RANGE: Final = 10.0  # Stribeck velocities that the right panel shows
 _WITHOUT_POINTS: Final = 2.5  # [rad/s], how far a model without measurements is drawn
 _WIDE: Final = 1.96  # standard errors to either side of a 95 % bar
@@ -64,7 +62,7 @@ def _draw_whole(axes: Axes, points: Sequence[MapPoint], robot: OneLinkRobot | No
     if robot is not None:
         speed = np.geomspace(1e-4, 1.0, 400) * fastest * 1.03
         for sign, curve in _curves(robot):
-            axes.plot(sign * speed, sign * curve.total(speed), color=_COLOUR[sign], zorder=3)
+            axes.plot(sign * speed, sign * curve.total(speed), color=DIRECTION_COLOUR[sign], zorder=3)
         rest = (-robot.friction.negative.static_torque, robot.friction.positive.static_torque)
         axes.plot((0.0, 0.0), rest, color=INK, linewidth=1.6, zorder=2.8)
     for point in points:
@@ -82,14 +80,14 @@ def _draw_slow(axes: Axes, points: Sequence[MapPoint], robot: OneLinkRobot | Non
     if robot is not None:
         speed = np.concatenate(([0.0], np.geomspace(1e-2 * floor, 1.15 * fastest, 400)))
         for direction, curve in _curves(robot):
-            axes.plot(speed, curve.total(speed), color=_COLOUR[direction], zorder=3)
+            axes.plot(speed, curve.total(speed), color=DIRECTION_COLOUR[direction], zorder=3)
     for point in points:
         if abs(point.velocity) <= 1.15 * fastest:
             _mark(axes, point, velocity=abs(point.velocity), torque=point.direction * point.torque)
 
 
 def _mark(axes: Axes, point: MapPoint, *, velocity: float, torque: float) -> None:
-    colour = _COLOUR[point.direction]
+    colour = DIRECTION_COLOUR[point.direction]
     axes.errorbar(
         velocity,
         torque,
@@ -113,7 +111,8 @@ def _curves(robot: OneLinkRobot) -> tuple[tuple[int, StribeckCurve], tuple[int, 
 def _legend(points: Sequence[MapPoint], robot: OneLinkRobot | None) -> list[Line2D]:
     line = 1.6 if robot is not None else 0.0
     handles = [
-        key(_NAME[sign], marker="o" if points else "", colour=_COLOUR[sign], line=line) for sign in (1, -1)
+        key(DIRECTION_NAME[sign], marker="o" if points else "", colour=DIRECTION_COLOUR[sign], line=line)
+        for sign in (1, -1)
     ]
     protocols = {point.protocol for point in points}
     if "constant_velocity" in protocols:

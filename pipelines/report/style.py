@@ -48,6 +48,8 @@ GREEN: Final = "#009e73"
 PURPLE: Final = "#b0578d"
 ORANGE: Final = "#e69f00"
 SKY: Final = "#56b4e9"
+DIRECTION_COLOUR: Final = {1: BLUE, -1: VERMILLION}
+DIRECTION_NAME: Final = {1: "$\\dot{q} > 0$", -1: "$\\dot{q} < 0$"}
 UNDER: Final = ("#9ccbe8", "#4ba3d3", "#0072b1", "#084a75")  # r < 1, the farther the paler
 OVER: Final = ("#9c3f00", "#d55e01", "#f0914a", "#f7be8f")  # r > 1, the farther the paler
 

@@ -14,10 +14,8 @@ from matplotlib.figure import Figure
 
 from pipelines.report.axis_units import units_of
 from pipelines.report.speed_axis import speed_axis
-from pipelines.report.style import BLUE, GRID, VERMILLION, key, new_figure, styled, zero_lines
+from pipelines.report.style import DIRECTION_COLOUR, DIRECTION_NAME, GRID, key, new_figure, styled, zero_lines
 
-_COLOUR: Final = {1: BLUE, -1: VERMILLION}
-_NAME: Final = {1: "$\\dot{q} > 0$", -1: "$\\dot{q} < 0$"}
 _LEAST_REACH: Final = 3.0  # standard errors that the picture shows at least
 
 
@@ -41,7 +39,7 @@ def validation_figure(
         zero_lines(axes)
         for point in points:
             _mark(axes, point, abs(point[variable]) if variable == "velocity" else point[variable])
-    handles = [key(_NAME[sign], marker="o", colour=_COLOUR[sign]) for sign in (1, -1)]
+    handles = [key(DIRECTION_NAME[sign], marker="o", colour=DIRECTION_COLOUR[sign]) for sign in (1, -1)]
     handles += [key("steady run", marker="o"), key("breakaway", marker="D")]
     figure.legend(handles=handles, loc="outside lower center", ncols=4, columnspacing=1.3)
     return figure
@@ -54,7 +52,7 @@ def _mark(axes: Axes, point: Mapping[str, Any], place: float) -> None:
         point["standardised"],
         marker="D" if breakaway else "o",
         markersize=3.4 if breakaway else 3.8,
-        color=_COLOUR[point["direction"]],
+        color=DIRECTION_COLOUR[point["direction"]],
         linestyle="none",
         zorder=4,
     )

@@ -10,7 +10,8 @@ import pytest
 from data.recording import Recording
 from ident.evidence.friction_map import steady_runs
 from ident.evidence.gathering import gather
-from ident.evidence.position_ripple import Trace, find_waves, trace
+from ident.evidence.position_ripple import find_waves
+from ident.evidence.traces import Trace, trace
 from ident.identification import identify
 from tests.ident.rigs import Rig
 

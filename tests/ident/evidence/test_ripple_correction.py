@@ -15,7 +15,7 @@ SPEED, PERIOD, TORQUE, AMPLITUDE, NOISE = 0.2, 1e-3, 1.5, 0.3, 0.01
 
 def _recording(*, amplitude: float) -> Recording:
     generator = np.random.default_rng(5)
-    time = PERIOD * np.arange(20_000)
+    time = PERIOD * np.arange(20_000, dtype=np.float64)
     position = SPEED * time
     torque = TORQUE + amplitude * np.cos(7.0 * position) + NOISE * generator.standard_normal(time.size)
     return Recording("steady", "constant_velocity", time, position, torque, resolution=1e-6)

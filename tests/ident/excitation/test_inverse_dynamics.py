@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from data.findings import Finding, Severity
 from data.recording import FloatArray, Recording
 from ident.excitation.filtering import Timing, equation
 from ident.excitation.inverse_dynamics import FrictionTerms, Law, least_squares, system
@@ -66,12 +65,7 @@ def test_a_gap_is_never_filtered_across_and_saturation_is_left_out() -> None:
     time[4000:] += 1.0
     torque = recording.torque.copy()
     torque[2000:2100] = 1e3  # a stretch whose torque is not the one that acted
-    spoilt = replace(
-        recording,
-        time=time,
-        torque=torque,
-        findings=(Finding("E-SAT", Severity.WARN, "flat"),),
-    )
+    spoilt = replace(recording, time=time, torque=torque, torque_limit=1e3)
     pieces = spans(spoilt)
     assert [piece.position.size for piece in pieces] == [4000, 4000]
     equations = [equation(piece, cutoff=20.0, timing="measured") for piece in pieces]

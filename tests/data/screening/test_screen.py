@@ -11,24 +11,26 @@ from hypothesis import strategies as st
 from data.findings import LogError, Severity
 from data.protocols import ProtocolName
 from data.resolution import lattice_spacing
-from data.screening import Screened, Signals, require_count, screen
+from data.screening.run import Run
+from data.screening.scale import require_count
+from data.screening.screen import Screened, screen
 
 COUNT = 2 * math.pi / 2**18
 
 
 def motion(
     n: int = 4000, *, amplitude: float = 1.0, frequency: float = 2.0, counts: float = COUNT, seed: int = 0
-) -> Signals:
+) -> Run:
     """A sinusoidal motion under dry and viscous friction, quantised, with torque noise."""
     time = np.arange(n, dtype=np.float64) * 1e-3
     position = amplitude * np.sin(frequency * time)
     velocity = amplitude * frequency * np.cos(frequency * time)
     torque = 0.4 * np.sign(velocity) + 0.1 * velocity + np.random.default_rng(seed).normal(0, 0.005, n)
     quantised = np.rint(position / counts) * counts if counts else position
-    return Signals("run", "excitation", time, quantised, torque, velocity, None)
+    return Run("run", "excitation", time, quantised, torque, velocity, None)
 
 
-def screened(run: Signals, torque_limit: float | None = None, resolution: float | None = COUNT) -> Screened:
+def screened(run: Run, torque_limit: float | None = None, resolution: float | None = COUNT) -> Screened:
     return screen(run, clock="column 't'", resolution=resolution, torque_limit=torque_limit)
 
 
@@ -55,7 +57,7 @@ def test_a_stick_and_a_sudden_breakaway_are_no_fault() -> None:
     slip = np.maximum(time - 1.5, 0.0)
     position = np.rint(4.0 * slip**2 / COUNT) * COUNT
     torque = 0.4 * time
-    got = screened(Signals("run", "breakaway", time, position, torque, None, None))
+    got = screened(Run("run", "breakaway", time, position, torque, None, None))
     assert got.findings == ()
 
 
