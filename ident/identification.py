@@ -126,7 +126,7 @@ def _from_evidence(
         fit_report=fit_report,
         evidence=evidence,
         weighted=weighted,
-        breakaways=breakaway_summaries(evidence, weighted.data),
+        breakaways=breakaway_summaries(evidence, weighted),
         validation=validate(recordings, evidence, weighted),
     )
 

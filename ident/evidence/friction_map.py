@@ -53,7 +53,8 @@ class MapPoint:
     protocol: ProtocolName
     direction: int  # +1 or -1
     velocity: float  # signed [rad/s]; 0 for a breakaway
-    torque: float  # signed [N m], corrected for acceleration
+    torque: float  # signed [N m], as logged less inertia times acceleration; of a breakaway at its onset
+    fitted: float | None  # what the law is fitted to: at zero ramp rate, without offset [N m]; None if unused
     stderr: float | None  # of the torque [N m]
     velocity_stderr: float | None  # [rad/s]
     ramp_rate: float | None  # signed [N m/s], breakaway only

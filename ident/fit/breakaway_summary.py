@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ident.evidence.gathering import Evidence
-from ident.fit.fit_data import FitData
 from ident.fit.law_model import DIRECTIONS, SIGN, Direction
+from ident.fit.weighting import Weighted, onset_torque
 
 
 @dataclass(frozen=True)
@@ -18,20 +18,18 @@ class BreakawaySummary:
     direction: Direction
     used: int
     censored: int  # ended at the torque limit
-    torque: (
-        tuple[float, float] | None
-    )  # least and greatest at the onset, at zero rate where rates matter [N m]
+    torque: tuple[float, float] | None  # least and greatest at the onset, at the rates that they had [N m]
     spread: float | None  # standard deviation of these [N m]
     ramp_rates: tuple[float, float] | None  # slowest and fastest [N m/s]
     places: tuple[float, float] | None  # least and greatest position of rest [rad]
 
 
-def breakaway_summaries(evidence: Evidence, data: FitData) -> tuple[BreakawaySummary, ...]:
+def breakaway_summaries(evidence: Evidence, weighted: Weighted) -> tuple[BreakawaySummary, ...]:
     """One for each direction, those without any breakaway included."""
-    found = []
+    found, onset = [], onset_torque(evidence.used_starts, weighted.fit)[0]
     for direction in DIRECTIONS:
         used = [start for start in evidence.used_starts if start.direction == SIGN[direction]]
-        torque = data.start_torque[data.start_direction == SIGN[direction]]
+        torque = onset[weighted.data.start_direction == SIGN[direction]]
         found.append(
             BreakawaySummary(
                 direction=direction,

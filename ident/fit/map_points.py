@@ -4,23 +4,26 @@ from __future__ import annotations
 
 from ident.evidence.friction_map import MapPoint
 from ident.evidence.gathering import Evidence
-from ident.fit.weighting import Weighted
+from ident.fit.weighting import Weighted, onset_torque
 
 
 def friction_map(evidence: Evidence, weighted: Weighted) -> tuple[MapPoint, ...]:
     """Every steady run and then every breakaway as a point, used or not, in the order of the logs."""
     points = []
     data, used = weighted.data, iter(range(weighted.data.torque.size))
+    offset = weighted.fit.values["torque_offset"]
     inertia = weighted.fit.values["inertia"] if data.has_inertia else 0.0
     for run in evidence.runs:
         number = next(used) if run.why is None else None
+        torque = run.torque - inertia * run.acceleration
         points.append(
             MapPoint(
                 log=run.log,
                 protocol="constant_velocity",
                 direction=run.direction,
                 velocity=run.velocity,
-                torque=run.torque - inertia * run.acceleration,
+                torque=torque,
+                fitted=None if number is None else torque - offset,
                 stderr=None if number is None else float(data.run_stderr[number]),
                 velocity_stderr=run.velocity_stderr,
                 ramp_rate=None,
@@ -30,17 +33,18 @@ def friction_map(evidence: Evidence, weighted: Weighted) -> tuple[MapPoint, ...]
                 why=run.why,
             )
         )
-    used = iter(range(data.start_torque.size))
+    used, onset = iter(range(data.start_torque.size)), onset_torque(evidence.used_starts, weighted.fit)[0]
     for start in evidence.starts:
         number = next(used) if start.why is None else None
-        torque = start.torque if number is None else start.direction * float(data.start_torque[number])
+        fitted = None if number is None else start.direction * float(data.start_torque[number]) - offset
         points.append(
             MapPoint(
                 log=start.log,
                 protocol="breakaway",
                 direction=start.direction,
                 velocity=0.0,
-                torque=torque,
+                torque=start.torque if number is None else start.direction * float(onset[number]),
+                fitted=fitted,
                 stderr=None if number is None else float(data.start_stderr[number]),
                 velocity_stderr=None,
                 ramp_rate=start.line.rate,

@@ -181,14 +181,14 @@ def _start_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> Floa
     """What the ramp's line, the wave's error and the detection make of a breakaway's variance (m,)."""
     starts = evidence.used_starts
     line = np.array([np.hypot(start.line.stderr, start.place_stderr) for start in starts])
-    _, delay_error = _onset_torque(starts, fit)
+    _, delay_error = onset_torque(starts, fit)
     return np.asarray(line**2 + delay_error**2)
 
 
 def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: Spread) -> FitData:
     """The data with onsets and standard errors as a fit and the spreads make them."""
     runs = data.torque.size
-    start_torque, _ = _onset_torque(evidence.used_starts, fit)
+    start_torque, _ = onset_torque(evidence.used_starts, fit)
     known = np.concatenate([_own_variance(evidence, data, fit), _start_variance(evidence, data, fit)])
     travel = np.array([run.travel for run in evidence.used_runs])
     part = np.ones(known.size)
@@ -242,7 +242,7 @@ def law_slopes(data: FitData, fit: FrictionFit) -> FloatArray:
     return slope
 
 
-def _onset_torque(starts: Sequence[Breakaway], fit: FrictionFit) -> tuple[FloatArray, FloatArray]:
+def onset_torque(starts: Sequence[Breakaway], fit: FrictionFit) -> tuple[FloatArray, FloatArray]:
     """Torque at the onset (m,) [N m], magnitudes, and the error that the delay may bring (m,)."""
     robots = {direction: robot_one_way(fit, direction) for direction in fit.model.directions}
     torque, error = np.zeros(len(starts)), np.zeros(len(starts))

@@ -2,7 +2,9 @@
 
 On the left every measurement over the signed velocity, as the paper draws it; on the right the magnitudes
 over the speed, spread out towards rest so that the Stribeck part can be judged and the two directions lie
-over each other. A run that was left out stays visible, as a hollow mark.
+over each other. A run that was left out stays visible, as a hollow mark; where the law is fitted to something
+else than was measured (a breakaway at zero ramp rate, a torque without its offset), a short dash stays where
+it was measured.
 """
 
 from __future__ import annotations
@@ -26,6 +28,7 @@ from pipelines.report.style import DIRECTION_COLOUR, DIRECTION_NAME, INK, key, n
 _STRIBECK_RANGE: Final = 10.0  # Stribeck velocities that the right panel shows
 _WITHOUT_POINTS: Final = 2.5  # [rad/s], how far a model without measurements is drawn
 _WIDE: Final = 1.96  # standard errors to either side of a 95 % bar
+_MEASURED: Final = "_"
 
 
 @styled
@@ -66,7 +69,7 @@ def _draw_whole(axes: Axes, points: Sequence[MapPoint], robot: OneLinkRobot | No
         rest = (-robot.friction.negative.static_torque, robot.friction.positive.static_torque)
         axes.plot((0.0, 0.0), rest, color=INK, linewidth=1.6, zorder=2.8)
     for point in points:
-        _mark(axes, point, velocity=point.velocity, torque=point.torque)
+        _mark(axes, point, velocity=point.velocity, side=1)
 
 
 def _draw_slow(axes: Axes, points: Sequence[MapPoint], robot: OneLinkRobot | None) -> None:
@@ -83,14 +86,17 @@ def _draw_slow(axes: Axes, points: Sequence[MapPoint], robot: OneLinkRobot | Non
             axes.plot(speed, curve.total(speed), color=DIRECTION_COLOUR[direction], zorder=3)
     for point in points:
         if abs(point.velocity) <= 1.15 * fastest:
-            _mark(axes, point, velocity=abs(point.velocity), torque=point.direction * point.torque)
+            _mark(axes, point, velocity=abs(point.velocity), side=point.direction)
 
 
-def _mark(axes: Axes, point: MapPoint, *, velocity: float, torque: float) -> None:
+def _mark(axes: Axes, point: MapPoint, *, velocity: float, side: int) -> None:
+    """A point as the law is fitted to it, times `side`, and where it was measured."""
     colour = DIRECTION_COLOUR[point.direction]
+    if _is_shifted(point):
+        axes.plot(velocity, side * point.torque, color=colour, marker=_MEASURED, markersize=5.0, zorder=2.6)
     axes.errorbar(
         velocity,
-        torque,
+        side * (point.torque if point.fitted is None else point.fitted),
         yerr=_WIDE * point.stderr if point.used and point.stderr else None,
         marker="D" if point.protocol == "breakaway" else "o",
         markersize=3.4 if point.protocol == "breakaway" else 3.8,
@@ -102,6 +108,11 @@ def _mark(axes: Axes, point: MapPoint, *, velocity: float, torque: float) -> Non
         capsize=0,
         zorder=4 if point.used else 2.5,
     )
+
+
+def _is_shifted(point: MapPoint) -> bool:
+    """Whether the law is fitted to something that lies visibly off the measurement."""
+    return point.fitted is not None and abs(point.fitted - point.torque) > 0.5 * (point.stderr or 0.0)
 
 
 def _curves(robot: OneLinkRobot) -> tuple[tuple[int, StribeckCurve], tuple[int, StribeckCurve]]:
@@ -119,6 +130,8 @@ def _legend(points: Sequence[MapPoint], robot: OneLinkRobot | None) -> list[Line
         handles.append(key("constant velocity, with 95 % bar", marker="o"))
     if "breakaway" in protocols:
         handles.append(key("breakaway", marker="D"))
+    if any(_is_shifted(point) for point in points):
+        handles.append(key("as measured, with ramp rate and offset", marker=_MEASURED))
     if any(not point.used for point in points):
         handles.append(key("left out", marker="o", hollow=True))
     return handles

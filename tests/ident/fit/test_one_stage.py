@@ -12,6 +12,7 @@ from ident.estimate import CURVE_PARAMETERS
 from ident.evidence.gathering import Evidence, IdentificationError
 from ident.fit.assumptions import Assumptions
 from ident.fit.cross_check import bootstrap_table
+from ident.fit.map_points import friction_map
 from ident.fit.one_stage import Explained, explain
 from ident.model.friction import StribeckCurve
 from tests.ident.test_coverage import ROBOT, synthetic_map
@@ -71,6 +72,9 @@ def test_one_law_stands_in_the_mean_with_its_offset() -> None:
     assert second.torque_offset.interval95 is not None
     assert set(second.covariance.names) >= {"torque_offset", "mean.static_torque"}
     assert "E-OFFSET" not in {finding.code for finding in second.findings}
+    explained = _explained(replace(evidence, runs=pushed, starts=starts), laws="one")
+    for point in friction_map(explained.evidence, explained.weighted):
+        assert point.torque - (point.fitted or 0.0) == pytest.approx(known[1], rel=0.01)
 
 
 def test_one_law_that_does_not_hold_both_ways_is_told() -> None:

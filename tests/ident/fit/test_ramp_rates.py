@@ -13,6 +13,7 @@ from data.recording import FloatArray
 from ident.evidence.breakaway import RampLine
 from ident.evidence.gathering import Evidence
 from ident.fit.assumptions import DEFAULT
+from ident.fit.map_points import friction_map
 from ident.fit.one_stage import explain
 from ident.fit.ramp_rates import rate_trend, trend_finding
 from tests.ident.test_coverage import ROBOT, _start, synthetic_map
@@ -76,3 +77,14 @@ def test_the_fit_takes_the_value_at_zero_rate_and_says_so() -> None:
         estimate = found.values.curves[direction]["static_torque"]  # type: ignore[index]  # both are keys
         assert estimate.stderr is not None
         assert estimate.value == pytest.approx(curve.static_torque, abs=4 * estimate.stderr)
+
+
+def test_the_friction_map_keeps_what_was_measured_beside_what_is_fitted() -> None:
+    evidence = _campaign(LINEAR, np.random.default_rng(4))
+    weighted = explain(evidence, axis="rotary", assumptions=DEFAULT).weighted
+    points = [point for point in friction_map(evidence, weighted) if point.protocol == "breakaway"]
+    assert [point.torque for point in points] == pytest.approx([start.torque for start in evidence.starts])
+    taken_off = [point.direction * (point.torque - (point.fitted or 0.0)) for point in points]
+    rates = np.array([abs(start.line.rate) for start in evidence.starts])
+    assert taken_off == pytest.approx(LINEAR(rates), abs=0.015)
+    assert max(taken_off[:3]) < min(taken_off[6:9])

@@ -25,6 +25,7 @@ def map_points() -> list[MapPoint]:
             direction=sign,
             velocity=sign * speed,
             torque=sign * float(curve.total(speed)),
+            fitted=None if speed == 0.006 else sign * float(curve.total(speed)),
             stderr=0.003,
             velocity_stderr=None,
             ramp_rate=None,
