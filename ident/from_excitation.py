@@ -9,12 +9,19 @@ import numpy as np
 
 from data.findings import Finding, Severity
 from data.recording import Recording
-from ident.estimate import Covariance, Estimate, IdentifiedRobot, RunUse
-from ident.evidence.gathering import Evidence, IdentificationError, log_findings, run_uses
+from ident.estimate import Covariance, IdentifiedRobot, RunUse
+from ident.evidence.gathering import (
+    Evidence,
+    IdentificationError,
+    log_findings,
+    require_possible_inertia,
+    run_uses,
+)
 from ident.excitation.excited_law import ExcitedLaw
 from ident.excitation.report import report
 from ident.fit.disagreement import inertia_disagreement
 from ident.fit.excitation_parameters import excitation_parameters, excited_inertia
+from ident.fit.one_stage import response_inertia
 from ident.fit.parameters import UNITS
 from ident.identified import Identification
 
@@ -38,11 +45,13 @@ def from_excitation(
             "`sign = -1` for torque or for position in [signals]."
         )
     values = excitation_parameters(excited, axis=axis)
+    coulomb = [value for name, value in excited.values.items() if name.endswith("coulomb_torque")]
+    require_possible_inertia(excited.values["inertia"], max(coulomb))
     sources = {"excitation": values.inertia}
     notes = [*log_findings(recordings), *values.findings]
     if evidence.response is not None:
         unit = UNITS[axis]["inertia"]
-        sources["frequency_response"] = Estimate(evidence.response.inertia, unit, evidence.response.stderr)
+        sources["frequency_response"] = response_inertia(evidence.response, unit=unit)
         response = ("frequency response", sources["frequency_response"])
         notes += inertia_disagreement(("excitation", values.inertia), response, unit=unit, cause=_CAUSE)
     held_out = (

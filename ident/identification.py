@@ -143,13 +143,15 @@ def _missing_tests(evidence: Evidence) -> list[Finding]:
     for direction in DIRECTIONS:
         starts = [start for start in evidence.starts if start.direction == SIGN[direction]]
         if not any(start.why is None or start.is_censored for start in starts):
+            none = "none of the starts can be used" if starts else "no breakaway was recorded"
             text = (
-                f"{direction} direction: no breakaway was recorded: F_s rests on the slowest speeds alone. "
-                "Ramps from "
-                "rest would measure it, and the inertia from the motion after."
+                f"{direction} direction: {none}: F_s rests on the slowest speeds alone. Ramps from rest "
+                "would measure it, and the inertia from the motion after."
             )
             found.append(Finding("E-TESTS", Severity.WARN, text))
     if evidence.response is None:
-        text = "no frequency response was recorded: the inertia rests on the motion after breakaway, if any."
+        reasons = sorted(set(evidence.response_reasons.values()))
+        none = f"can be used ({'; '.join(reasons)})" if reasons else "was recorded"
+        text = f"no frequency response {none}: the inertia rests on the motion after breakaway, if any."
         found.append(Finding("E-TESTS", Severity.WARN, text))
     return found

@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import find_peaks
 
 from data.recording import FloatArray, Recording
 from ident.evidence.segmentation import AT_LIMIT, Stretch, grain, slow_spans, stretches
@@ -31,6 +32,8 @@ ONSET_COUNTS = 3.5  # the first reading beyond is the onset
 LEAST_SAMPLES = 12  # of a ramp
 STRAIGHT = 0.001  # part of the torque by which a ramp may bend off its line
 KEPT = 0.7  # part of the longest straight stretch that the line goes through
+PUSHED = 0.1  # part of the log's largest torque, from which on a link that creeps is pushed
+TAKEN_BACK = 0.3  # part of a rest's largest torque by which a ramp that was given up falls
 FLAT = 0.3  # part of the band next to the log's largest torque by which a flat top may rise
 
 
@@ -78,6 +81,7 @@ def breakaways(recording: Recording) -> tuple[Breakaway, ...]:
     found = []
     for number, rest in enumerate(still):
         after = still[number + 1].first if number + 1 < len(still) else recording.time.size
+        found += _abandoned(recording, rest)
         start = _start(recording, rest, after)
         moved = None if start is None or start.travel == 0.0 else start.direction
         until = rest.last if start is None or moved is None else start.onset
@@ -137,13 +141,15 @@ def _longest_run(holds: NDArray[np.bool_]) -> NDArray[np.int64]:
 
 
 def _flat(recording: Recording, reached: NDArray[np.int64], band: float) -> bool:
-    """Whether the torque surely stays over the samples (n,) next to its top: a ramp would cross the band."""
+    """Whether the torque surely stays over the samples (n,) next to its top: a ramp would cross the band, and
+    one that is taken back at once would fall again.
+    """
     if reached.size < 5 * LEAST_SAMPLES:
         return False
     part = slice(int(reached[0]) + LEAST_SAMPLES, int(reached[-1]))
     line, _ = _line(recording.time[part], recording.torque[part], 0.0, 0.0)
-    span = float(recording.time[part][-1] - recording.time[part][0])
-    return bool(max(2.0 * line.stderr, abs(line.rate) * span) < FLAT * band)
+    thirds = [float(piece.mean()) for piece in np.array_split(recording.torque[part], 3)]
+    return 2.0 * line.stderr < FLAT * band and max(thirds) - min(thirds) < FLAT * band
 
 
 def _start(recording: Recording, rest: Stretch, after: int) -> Breakaway | None:
@@ -157,7 +163,7 @@ def _start(recording: Recording, rest: Stretch, after: int) -> Breakaway | None:
     searched = rest.last - late.size - rest.first
     far = np.flatnonzero(np.abs(away[searched:]) >= max(SUSTAINED_COUNTS * resolution, 2.0 * least))
     if far.size == 0:
-        return _creep(recording, rest, place, float(np.max(np.abs(away))) / resolution)
+        return _creep(recording, rest, place, float(np.ptp(away)) / resolution)
     sustained = int(far[0]) + searched
     direction = 1 if away[sustained] > 0 else -1
     near = np.flatnonzero(direction * away[: sustained + 1] < least)
@@ -202,12 +208,31 @@ def _objection(recording: Recording, start: Breakaway) -> str | None:
     return None
 
 
+def _abandoned(recording: Recording, rest: Stretch) -> list[Breakaway]:
+    """Ramps within a rest that were taken back before the link ran, though it had crept under them."""
+    size = LEAST_SAMPLES
+    if rest.last - rest.first < 4 * size:
+        return []
+    torque = np.convolve(recording.torque[rest.first : rest.last], np.full(size, 1 / size), "valid")
+    tops, about = find_peaks(np.abs(torque), prominence=TAKEN_BACK * float(np.max(np.abs(torque))))
+    found = []
+    for top, base in zip(tops + size // 2, about["left_bases"] + size // 2, strict=True):
+        first, last = rest.first + int(base), rest.first + int(top)
+        place = float(np.median(recording.position[max(rest.first, first - size) : first + 1]))
+        counts = abs(float(np.median(recording.position[last - size // 2 : last + 1])) - place)
+        creep = _creep(recording, Stretch(first, last + 1, 0.0, 0.0), place, counts / grain(recording))
+        found += [creep] if creep else []
+    return found
+
+
 def _creep(recording: Recording, rest: Stretch, place: float, counts: float) -> Breakaway | None:
     """A rest that ends in no sustained motion, though it has crept under a ramp; None without either."""
     last = min(rest.last, recording.time.size) - 1
     if counts < ONSET_COUNTS or not np.isfinite(_ramp_line(recording, rest.first, last + 1).stderr):
         return None
     torque = float(np.mean(recording.torque[max(rest.first, last - LEAST_SAMPLES) : last + 1]))
+    if abs(torque) < PUSHED * float(np.max(np.abs(recording.torque))):
+        return None  # it still settles
     return Breakaway(
         log=recording.log,
         direction=1 if torque > 0 else -1,

@@ -21,6 +21,7 @@ What a run has to survive:
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -43,6 +44,7 @@ TORQUE_DRIFT = 0.25  # part of the torque: a place may change it by as much
 CLEAR = 5.0  # standard errors of a slope that is one
 STRAIGHT = 0.8  # part of the way between two rests that a constant speed makes at least
 LIMITED_SHARE = 0.02
+ROUNDED = 3.0  # counts that two roundings and a slope through few counts may err by
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,8 @@ class SteadyRun:
     why: str | None = None  # why it is left out, beginning with its code
     place_stderr: float = 0.0  # of the mean torque, from what varies with position [N m]
     trimmed: str | None = None  # what was cut off of a run that is used, beginning with its code
+    torque_change: float = math.nan  # from end to end of the run, along a line; NaN if unknown [N m]
+    scatter: float = math.inf  # standard deviation of the torque within the run; infinite if unknown [N m]
 
     @property
     def direction(self) -> int:
@@ -144,23 +148,24 @@ def _end_speeds(recording: Recording, step: Stretch) -> tuple[float, float]:
     return first - 0.5 * (second - first), second + 0.5 * (second - first)
 
 
+def _too_few(counts: float) -> str:
+    return (
+        f"E-QUANT: {counts:.1f} counts of travel, under {LEAST_COUNTS:.0f}: the speed is the encoder's "
+        "rounding. Record it for longer."
+    )
+
+
 def _steady_run(recording: Recording, step: Stretch, *, meant: int) -> SteadyRun:
     """A step as a run, `meant` the number of samples that were to be of its speed."""
     counts = abs(step.travel) / grain(recording)
     if counts < LEAST_COUNTS:
-        return replace(
-            _measure(recording, step),
-            why=f"E-QUANT: {counts:.1f} counts of travel, under {LEAST_COUNTS:.0f}: the speed is the "
-            "encoder's "
-            "rounding. Record it for longer.",
-        )
+        return replace(_measure(recording, step), why=_too_few(counts))
     share = _share_at_rest(recording, step)
     if share > STILL_SHARE:
         return replace(
             _measure(recording, step),
             why=f"E-STICKSLIP: the link is at rest in {100 * share:.0f} % of the run: its mean torque is "
-            "not the "
-            "friction at its mean speed. Raise the speed or the speed loop's damping.",
+            "not the friction at its mean speed. Raise the speed or the speed loop's damping.",
         )
     window = _steady_window(recording, step)
     left = (window.last - window.first) / (step.last - step.first)
@@ -174,6 +179,9 @@ def _steady_run(recording: Recording, step: Stretch, *, meant: int) -> SteadyRun
         )
     kept = abs(run.velocity) * (run.end_time - run.start_time) / grain(recording)
     if kept < LEAST_COUNTS:
+        evenly = counts * (run.end_time - run.start_time) / step.duration
+        if abs(kept - evenly) < ROUNDED:
+            return replace(run, why=_too_few(kept))
         return replace(
             run,
             why=f"E-STICKSLIP: the link moves {kept:.1f} counts in the steady part of the run, from "
@@ -222,6 +230,7 @@ def _measure(recording: Recording, window: Stretch) -> SteadyRun:
     hunting = _slope_scatter(centred, offset - basis @ np.array([offset.mean(), slope, bend])) / duration
     bend_error = 12.0 * rounding / duration
     acceleration = 2.0 * bend / duration**2
+    (_, change, _), *_ = np.linalg.lstsq(basis, torque, rcond=None)
     white_stderr, block_ratio = torque_scatter(torque)
     return SteadyRun(
         log=recording.log,
@@ -235,6 +244,8 @@ def _measure(recording: Recording, window: Stretch) -> SteadyRun:
         swing=swing(recording, window),
         start_time=float(time[0]),
         end_time=float(time[-1]),
+        torque_change=float(change) if time.size >= 3 else math.nan,
+        scatter=float(torque.std()),
     )
 
 

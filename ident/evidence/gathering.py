@@ -27,6 +27,7 @@ from ident.evidence.ripple_correction import (
 from ident.evidence.traces import traces_of
 
 NEAR = 3.0  # ratio of speeds within which friction is of one size
+STOPS = (1e-4, 1e7)  # [rad/s^2] or [m/s^2], deceleration by friction that some rig may have
 ABSURD = 50.0  # ratio of two torques, or two inertias, that ought to be of one size
 
 
@@ -228,9 +229,25 @@ def _require_one_unit(evidence: Evidence) -> None:
         log = evidence.used_starts[0].log
         _require_same(float(np.median(starts)), typical, f"{log}: the breakaway torque", "constant speeds")
     rough = _rough_inertia(evidence.runs, evidence.momenta)
+    inertia = rough if evidence.response is None else evidence.response.inertia
+    if inertia is not None:
+        require_possible_inertia(inertia, typical)
     if evidence.response is not None and rough is not None:
         log = evidence.response.fits[0].log
         _require_same(evidence.response.inertia, rough, f"{log}: the implied inertia", "breakaways")
+
+
+def require_possible_inertia(inertia: float, friction: float) -> None:
+    """E-UNIT: refuse an inertia [kg m^2] that friction [N m] would stop as no rig's is stopped."""
+    if not (inertia > 0.0 and friction > 0.0) or STOPS[0] < friction / inertia < STOPS[1]:
+        return
+    raise IdentificationError(
+        f"E-UNIT: the implied inertia is {inertia:.4g} kg m^2 (kg for a linear axis) under a friction of "
+        f"{friction:.4g}: it would stop at {friction / inertia:.2g} rad/s^2 (m/s^2), which no rig does (from "
+        f"{STOPS[0]:g} to {STOPS[1]:g}). The time looks like ms or us that were read as s, or the position "
+        "like another unit; J, b and v_s would be off by powers of ten. Correct `unit` of the time or of the "
+        "position in [signals]."
+    )
 
 
 def _require_same(own: float, others: float, what: str, source: str) -> None:

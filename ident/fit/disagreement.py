@@ -7,7 +7,7 @@ import numpy as np
 from data.findings import Finding, Severity
 from ident.estimate import Estimate
 
-COMPATIBLE = 3.0  # standard errors between two sources of one value
+COMPATIBLE = 2.0  # 95 % half-widths of the difference of two values that are one; about 4 standard errors
 
 
 def inertia_disagreement(
@@ -19,7 +19,8 @@ def inertia_disagreement(
         return []
     text = (
         f"the inertia from {one[0]} is {one[1].value:.4g} and from {two[0]} {two[1].value:.4g} {unit}, "
-        f"{distance:.1f} standard errors apart: a scale of the torque that changes, {cause}"
+        f"{distance:.1f} times as far apart as their 95 % intervals allow: a scale of the torque that "
+        f"changes, {cause}"
     )
     return [Finding("E-LACKOFFIT", Severity.WARN, text)]
 
@@ -39,7 +40,14 @@ def asymmetry(positive: Estimate, negative: Estimate, *, unit: str) -> list[Find
 
 
 def _distance(one: Estimate, two: Estimate) -> float | None:
-    """Between two values, in standard errors; None where one of them has none."""
-    if one.value is None or two.value is None or one.stderr is None or two.stderr is None:
+    """Between two values, in 95 % half-widths of the difference; None where one of them has no interval."""
+    first, second = _half_width(one), _half_width(two)
+    if one.value is None or two.value is None or not (first and second):
         return None
-    return abs(one.value - two.value) / float(np.hypot(one.stderr, two.stderr))
+    return abs(one.value - two.value) / float(np.hypot(first, second))
+
+
+def _half_width(estimate: Estimate) -> float:
+    """Half of the 95 % interval; 0 where it is open or unknown."""
+    low, high = estimate.interval95 or (None, None)
+    return 0.0 if low is None or high is None else 0.5 * (high - low)

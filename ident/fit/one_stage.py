@@ -136,9 +136,14 @@ def _response_source(
         return Estimate(None, unit, withheld=f"E-LOWSPEED: {text}"), Finding(
             "E-LOWSPEED", Severity.WITHHOLD, text, fit.log
         )
+    return response_inertia(response, unit=unit), None
+
+
+def response_inertia(response: FrequencyInertia, *, unit: str) -> Estimate:
+    """The inertia of the frequency response with its 95 % interval."""
     reach = quantile(response.dof) * response.stderr
     interval = (response.inertia - reach, response.inertia + reach)
-    return Estimate(response.inertia, unit, response.stderr, interval), None
+    return Estimate(response.inertia, unit, response.stderr, interval)
 
 
 def _stribeck_range(weighted: Weighted, direction: Direction) -> float:

@@ -2,7 +2,8 @@ r"""What the residuals of the settled fit betray: drift, errors of speed, a law 
 
 A cause that the law leaves out is tested as a column added to it (`ident.fit.added_columns`).
 
-- E-DRIFT: friction that grows or falls with time, in parts of itself, or an offset of the torque that does.
+- E-DRIFT: friction that grows or falls with time, in parts of itself, or an offset of the torque that does;
+  over the recording, or within the runs, all alike (signed ranks: Wilcoxon 1945).
 - E-LACKOFFIT: runs at one speed that scatter less about each other than about the law; residuals that keep
   their sign over many speeds; or that follow slow waves over the ranks of the speeds, as those of a law of
   another shape do (a smooth test: Eubank and Hart 1992).
@@ -12,15 +13,17 @@ A cause that the law leaves out is tested as a column added to it (`ident.fit.ad
 
 from __future__ import annotations
 
+from typing import TypeGuard
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
-from scipy.stats import rankdata
+from scipy.stats import rankdata, wilcoxon
 
 from data.findings import Finding, Severity
 from data.recording import Axis, FloatArray
 from ident.evidence.gathering import Evidence
-from ident.fit.added_columns import CHANCE, added
+from ident.fit.added_columns import CHANCE, Added, added
 from ident.fit.circumstances import Circumstances
 from ident.fit.law_model import SIGN
 from ident.fit.parameters import UNITS
@@ -30,6 +33,9 @@ from ident.fit.weighting import Weighted, law_slopes
 
 WAVES = 6  # slow ones over the ranks of the speeds
 DRIFT_CHANCE = 5e-4  # of a drift: dated logs that were run in order of speed leave few data to tell
+DRIFT_MATTERS = 0.005  # part of the friction by which a drift over the recording is worth a word
+WITHIN_MATTERS = 0.02  # and one within runs, which still may settle
+LEAST_ALIKE = 12  # runs that may change alike by chance
 SAME_SPEED = 0.02  # relative difference of speeds that are replicates
 LEAST_REPLICATES = 3  # degrees of freedom within speeds
 SPEED_SHARE = 0.3  # of the torque's error
@@ -41,6 +47,7 @@ def residual_findings(
     """Everything that the residuals betray."""
     found = [
         *_drift(weighted, seen, axis),
+        *_drift_within(evidence, axis),
         *_replicates(weighted),
         *_bends(weighted),
         *_speed_errors(evidence, weighted),
@@ -65,21 +72,49 @@ def _drift(weighted: Weighted, seen: Circumstances, axis: Axis) -> list[Finding]
     offset = added(weighted, (time / span * sign)[:, None], groups=means * sign[:, None])
     over = f"over {span:.3g} s of recording" if len(groups) == 1 else f"within logs, over {span:.3g} s"
     advice = "Warm the rig up, repeat the first speed at the end, and mix the order of the speeds."
-    if friction is not None and friction.chance < DRIFT_CHANCE:
-        part, typical = float(friction.coefficients[0]), float(np.median(size))
+    typical = float(np.median(size))
+    if _drifts(friction, DRIFT_MATTERS):
+        part = float(friction.coefficients[0])
         text = (
             f"friction changes by {100 * part:+.2g} % ({part * typical:+.2g} {unit}) {over} "
             f"(p = {friction.chance:.1g}): the law is that of the middle of the recording, and where speeds "
             f"were run in order the change bends b and F_c. {advice}"
         )
         return [Finding("E-DRIFT", Severity.WARN, text)]
-    if offset is not None and offset.chance < DRIFT_CHANCE:
+    if _drifts(offset, DRIFT_MATTERS * typical):
         text = (
             f"an offset of the torque changes by {float(offset.coefficients[0]):+.2g} {unit} {over} "
             f"(p = {offset.chance:.1g}): F_c and F_s of the two directions are moved against each other. "
             f"Zero the torque sensor. {advice}"
         )
         return [Finding("E-DRIFT", Severity.WARN, text)]
+    return []
+
+
+def _drifts(column: Added | None, least: float) -> TypeGuard[Added]:
+    """Whether a column is no chance, and so large that it matters."""
+    return column is not None and column.chance < DRIFT_CHANCE and abs(float(column.coefficients[0])) > least
+
+
+def _drift_within(evidence: Evidence, axis: Axis) -> list[Finding]:
+    """Runs over which the torque changes alike; where waves over the position are known, those explain it."""
+    runs = [run for run in evidence.used_runs if np.isfinite(run.torque_change)]
+    if evidence.waves or len(runs) < LEAST_ALIKE:
+        return []
+    change = np.array([run.torque_change for run in runs])
+    sign = np.array([run.direction for run in runs])
+    size = np.array([abs(run.torque) for run in runs])
+    for what, own in (("friction", sign * change), ("an offset of the torque", change)):
+        chance = float(wilcoxon(own / size).pvalue)
+        typical = float(np.median(own))
+        if chance < DRIFT_CHANCE and abs(typical) > WITHIN_MATTERS * float(np.median(size)):
+            text = (
+                f"{what} changes by {typical:+.2g} {UNITS[axis]['torque_offset']} within each run, in most "
+                f"of {len(runs)} alike (p = {chance:.1g}): the law is that of the middle of the runs, and a "
+                "breakaway or a motion is met by another. Warm the rig up and let each speed run in, or "
+                "look for what varies with the position if all runs begin at one place."
+            )
+            return [Finding("E-DRIFT", Severity.WARN, text)]
     return []
 
 

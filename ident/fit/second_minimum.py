@@ -90,4 +90,5 @@ def _differ(fit: FrictionFit, other: Mapping[str, float], law: LawName) -> bool:
 
 def _both(fit: FrictionFit, other: Mapping[str, float], law: LawName) -> str:
     first, second = law_values(fit.values, law), law_values(other, law)
-    return ", ".join(f"{name} = {first[name]:.3g} or {second[name]:.3g}" for name in CURVE_PARAMETERS)
+    names = (name for name in CURVE_PARAMETERS if first[name] != second[name])
+    return ", ".join(f"{name} = {first[name]:.3g} or {second[name]:.3g}" for name in names)

@@ -12,7 +12,9 @@ w_i^2 what is known of the datum's own error, tau the run-to-run spread, lambda 
 averages out (infinite: it never does), sigma the spread of places. tau and sigma are of each direction:
 joints that rub differently also stray differently, and a common spread would promise too much for the worse.
 They are the most likely under what the fit leaves over (`ident.fit.restricted_likelihood`). A finite lambda
-has to earn its place: it is the best of several tried, and it makes long runs look better.
+has to earn its place: it is the best of several tried, and it makes long runs look better. And what averages
+out over a run has to be seen within it: a torque that hardly scatters over many lambda hides no ripple. A law
+that fits fast runs and not the slow ones would else be explained by ripple that is not there.
 
 A single breakaway says nothing of its spread: the other direction's is taken, or if that has none either,
 the steady runs'.
@@ -31,6 +33,8 @@ from ident.evidence.friction_map import SteadyRun
 from ident.fit.restricted_likelihood import most_likely_variances
 
 TRAVELS = 8  # candidates for lambda
+SEEN = 4.0  # times the largest variance within long runs: more cannot average out unseen
+LONG = 2.0  # lambda that a run covers which must show it
 EARNED = 6.0  # by which twice the log likelihood must rise for a finite lambda
 FINEST = 1e-4  # least standard error, in parts of the torque: no torque sensor knows more
 REPLICATES = 2  # breakaways that show a spread
@@ -81,7 +85,12 @@ def white_variance(runs: Sequence[SteadyRun]) -> FloatArray:
 
 
 def spread_of(
-    residual: FloatArray, basis: FloatArray, known: FloatArray, groups: NDArray[np.bool_], travel: FloatArray
+    residual: FloatArray,
+    basis: FloatArray,
+    known: FloatArray,
+    groups: NDArray[np.bool_],
+    travel: FloatArray,
+    scatter: FloatArray,
 ) -> Spread:
     """The most likely spread.
 
@@ -92,13 +101,29 @@ def spread_of(
     known : (n + m,) variance that is known [(N m)^2]
     groups : (g, n + m) from `members`
     travel : (n,) of the runs [rad]
+    scatter : (n,) standard deviation of the torque within each [N m]
     """
     best, least = Spread(np.zeros(len(groups)), np.inf), np.inf
-    for wavelength in (np.inf, *np.geomspace(travel.min(), travel.max(), TRAVELS)):
+    for wavelength in (np.inf, *np.geomspace(travel.min(), travel.max() / LONG, TRAVELS)):
         part = np.ones(residual.size)
         part[: travel.size] = averaged_out(travel, wavelength)
         variances, cost = most_likely_variances(residual, basis, known, groups * part)
         cost += EARNED if np.isfinite(wavelength) else 0.0
-        if cost < least:
+        if cost < least and _would_be_seen(variances, groups, travel, scatter, wavelength):
             best, least = Spread(variances, float(wavelength)), cost
     return best
+
+
+def _would_be_seen(
+    variances: FloatArray,
+    groups: NDArray[np.bool_],
+    travel: FloatArray,
+    scatter: FloatArray,
+    wavelength: float,
+) -> bool:
+    """Whether the torque within long runs (n,) scatters as what averages out over them must make it."""
+    for variance, group in zip(variances, groups[:, : travel.size], strict=True):
+        long = group & (travel >= LONG * wavelength)
+        if np.any(long) and variance > SEEN * float(np.max(scatter[long])) ** 2:
+            return False
+    return True

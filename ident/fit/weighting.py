@@ -165,8 +165,9 @@ def _spread_of(evidence: Evidence, data: FitData, fit: FrictionFit) -> Spread:
     residual = measured(data) - predicted(data, fit.values)
     known = np.concatenate([_own_variance(evidence, data, fit), _start_variance(evidence, data, fit)])
     travel = np.array([run.travel for run in evidence.used_runs])
+    scatter = np.array([run.scatter for run in evidence.used_runs])
     groups = members(data.run_direction, data.start_direction)
-    return spread_of(residual, gradient(data, fit), known, groups, travel)
+    return spread_of(residual, gradient(data, fit), known, groups, travel, scatter)
 
 
 def _own_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatArray:
@@ -188,7 +189,7 @@ def _start_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> Floa
 def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: Spread) -> FitData:
     """The data with onsets and standard errors as a fit and the spreads make them."""
     runs = data.torque.size
-    start_torque, _ = onset_torque(evidence.used_starts, fit)
+    start_torque, delay_error = onset_torque(evidence.used_starts, fit)
     known = np.concatenate([_own_variance(evidence, data, fit), _start_variance(evidence, data, fit)])
     travel = np.array([run.travel for run in evidence.used_runs])
     part = np.ones(known.size)
@@ -197,7 +198,7 @@ def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: Spre
     total = known + by_group.sum(axis=0)
     start_stderr = np.sqrt(total[runs:])
     rate = np.array([abs(start.line.rate) for start in evidence.used_starts])
-    trend = rate_trend(data.start_direction, rate, start_torque, start_stderr)
+    trend = rate_trend(data.start_direction, rate, start_torque, start_stderr, delay_error)
     if trend is not None:
         start_torque = start_torque - trend.excess
         start_stderr = start_stderr * trend.widening(data.start_direction)

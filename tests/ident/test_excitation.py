@@ -68,7 +68,7 @@ def test_beside_other_logs_the_inertia_stands_where_there_is_no_other() -> None:
     found = with_excitation(without, excited).robot
     assert found.inertia.value == alone.robot.inertia.value
     assert found.covariance.names == ("inertia", "positive.coulomb_torque")
-    other = Estimate(0.03, "kg m^2", stderr=1e-5)
+    other = Estimate(0.03, "kg m^2", stderr=1e-5, interval95=(0.02998, 0.03002))
     with_other = replace(without, robot=replace(robot, inertia=other))
     found = with_excitation(with_other, excited).robot
     assert found.inertia == other

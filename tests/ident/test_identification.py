@@ -205,6 +205,14 @@ def test_a_torque_of_the_wrong_sign_is_refused() -> None:
         identify(turned)
 
 
+@pytest.mark.parametrize("unit", [1e3, 1e-6])
+def test_times_in_another_unit_are_refused_where_no_velocity_tells(unit: float) -> None:
+    rig, generator = RIGS["bench"], np.random.default_rng(16)
+    logs = [*_speeds(rig, generator), rig.ramps([0.1, -0.1], generator)]
+    with pytest.raises(IdentificationError, match=r"E-UNIT.*implied inertia"):
+        identify([replace(log, time=log.time * unit) for log in logs])
+
+
 def test_too_few_speeds_are_refused() -> None:
     rig, generator = RIGS["bench"], np.random.default_rng(17)
     few = [rig.speeds([speed, -speed], generator, log=f"{speed}") for speed in (0.02, 0.1, 0.5, 2.0)]

@@ -93,6 +93,28 @@ def test_creep_of_a_few_counts_is_no_breakaway() -> None:
     assert [str(start.why)[:7] for start in found] == ["E-CREEP"]
 
 
+@pytest.mark.parametrize("held", [0.0, 0.5, 1.0])  # part of the creep that stays when the torque is gone
+def test_a_ramp_that_is_taken_back_before_the_next_is_creep(held: float) -> None:
+    recording = Rig().ramps([0.2], np.random.default_rng(9))
+    count, period = recording.resolution or 0.0, recording.sample_period
+    ramp = np.concatenate([np.arange(0.0, 0.4, 0.2 * period), np.zeros(500)])
+    creep = 8.0 * np.where(np.arange(ramp.size) < ramp.size - 500, (ramp / 0.4) ** 2, held) * count
+    position = np.concatenate([np.round(creep / count) * count, recording.position + creep[-1]])
+    noise = 0.01 * np.random.default_rng(10).standard_normal(ramp.size)
+    torque = np.concatenate([ramp + noise, recording.torque])
+    time = period * np.arange(torque.size, dtype=np.float64)
+    found = breakaways(replace(recording, time=time, position=position, torque=torque))
+    assert [str(start.why)[:7] for start in found] == ["E-CREEP", "None"]
+
+
+def test_a_ramp_that_is_taken_back_at_once_is_no_flat_top() -> None:
+    rig = Rig(torque_noise=0.001)
+    up = np.arange(0.0, 0.45, 2e-5)
+    torque = np.concatenate([np.zeros(500), up, up[::-1], np.zeros(500)])
+    recording = rig.torque_driven(torque, np.random.default_rng(11), protocol="breakaway")
+    assert not any(start.is_censored for start in breakaways(replace(recording, torque_limit=None)))
+
+
 def test_pre_sliding_of_many_fine_counts_is_not_taken_for_the_onset() -> None:
     recording = Rig(resolution=2 * math.pi / 2**20, torque_noise=0.002).ramps([0.1], np.random.default_rng(6))
     smooth = np.convolve(recording.torque, np.full(200, 1 / 200), mode="same")

@@ -26,11 +26,11 @@ LOGARITHMIC: Law = lambda rate: np.asarray(0.03 * np.log1p(rate / 0.05))  # noqa
 
 def _ramps(
     effect: Law, rates: tuple[float, ...], generator: np.random.Generator, *, each: int = 3
-) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray]:
+) -> tuple[NDArray[np.int64], FloatArray, FloatArray, FloatArray, FloatArray]:
     direction = np.repeat(np.array([1, -1], dtype=np.int64), len(rates) * each)
     rate = np.tile(np.repeat(rates, each), 2)
     torque = 0.55 + effect(rate) + SPREAD * generator.standard_normal(rate.size)
-    return direction, rate, torque, np.full(rate.size, SPREAD)
+    return direction, rate, torque, np.full(rate.size, SPREAD), np.zeros(rate.size)
 
 
 def test_no_trend_is_seen_where_there_is_none() -> None:
@@ -48,6 +48,13 @@ def test_the_value_at_zero_rate_lies_where_its_error_says(effect: Law, shape: st
     assert np.mean([abs(own.torque - 0.55) < 2.06 * own.stderr for own in zero]) > 0.88
     assert sum(trend is not None and trend.shape == shape for trend in trends) > 45
     assert all(own.widening > 1.0 for own in zero)
+
+
+def test_a_delay_that_is_wrong_in_all_ramps_is_no_trend() -> None:
+    late: Law = lambda rate: np.asarray(0.05 * rate)  # noqa: E731
+    direction, rate, torque, stderr, none = _ramps(late, (0.05, 0.1, 0.4), np.random.default_rng(5), each=6)
+    assert rate_trend(direction, rate, torque, stderr, none) is not None
+    assert rate_trend(direction, rate, torque, stderr, 0.01 * rate / 0.4) is None
 
 
 def test_one_rate_tells_no_trend() -> None:

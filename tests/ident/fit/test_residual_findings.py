@@ -99,6 +99,23 @@ def test_drift_is_not_told_where_speeds_were_run_in_order_and_the_law_imitates_i
     assert "E-DRIFT" not in {own.code for own in found}
 
 
+@pytest.mark.parametrize(("change", "told"), [(-0.03, True), (-0.005, False), (0.0, False)])
+def test_runs_that_drift_alike_are_told_with_the_size(change: float, told: bool) -> None:
+    generator = np.random.default_rng(4)
+    evidence = synthetic_map(SPEEDS, SPREAD, generator)
+    runs = [
+        replace(run, torque_change=run.direction * (change + 0.004 * float(generator.standard_normal())))
+        for run in evidence.runs
+    ]
+    evidence = replace(evidence, runs=tuple(runs))
+    seen = _seen(len(runs) + len(evidence.starts), generator)
+    found = residual_findings(evidence, settle(evidence, EACH), seen, "rotary")
+    said = [own.text for own in found if own.code == "E-DRIFT" and "within each run" in own.text]
+    assert bool(said) is told
+    if told:
+        assert float(said[0].split("changes by ")[1].split(" N m")[0]) == pytest.approx(change, abs=0.004)
+
+
 def test_replicates_tell_a_law_that_does_not_fit() -> None:
     speeds = np.asarray(np.repeat(np.geomspace(0.005, 2.5, 10), 2), dtype=np.float64)
     bend = np.tile(np.repeat([0.03, 0.0, -0.03, 0.03, -0.03, 0.03, -0.03, 0.03, 0.0, -0.03], 2), 2)
