@@ -28,7 +28,7 @@ from ident.evidence.gathering import Evidence
 from ident.fit.confidence import quantile
 from ident.fit.fit_data import FitData
 from ident.fit.friction_fit import friction_torque, law_of, residuals
-from ident.fit.law_model import SIGN, Direction
+from ident.fit.law_model import DIRECTIONS, SIGN, Direction
 from ident.fit.slopes import slopes
 from ident.fit.weighting import Weighted
 from ident.model.friction import steepest_fall_factor
@@ -107,6 +107,15 @@ def advise(evidence: Evidence, weighted: Weighted) -> tuple[Advice, ...]:
         for direction in weighted.data.model.directions
         for quantity in QUANTITIES
     )
+
+
+def advise_without_map() -> tuple[Advice, ...]:
+    """Where neither constant speeds nor breakaways were recorded: there is no law to plan with yet."""
+    why = (
+        "neither constant speeds nor ramps were recorded, which these rest on: record ten or more speeds in "
+        "ratio from the slowest that the loop holds to the fastest, and three slow ramps from rest"
+    )
+    return tuple(Advice(way, quantity, None, (), why) for way in DIRECTIONS for quantity in QUANTITIES)
 
 
 def _advice(

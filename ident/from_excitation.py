@@ -19,6 +19,7 @@ from ident.evidence.gathering import (
 )
 from ident.excitation.excited_law import ExcitedLaw
 from ident.excitation.report import report
+from ident.fit.assumptions import Assumptions
 from ident.fit.disagreement import inertia_disagreement
 from ident.fit.excitation_parameters import excitation_parameters, excited_inertia
 from ident.fit.one_stage import response_inertia
@@ -31,7 +32,7 @@ _CAUSE = (
 
 
 def from_excitation(
-    recordings: Sequence[Recording], evidence: Evidence, excited: ExcitedLaw | str
+    recordings: Sequence[Recording], evidence: Evidence, excited: ExcitedLaw | str, assumptions: Assumptions
 ) -> Identification:
     """The law from excitation alone; raises `IdentificationError` where it holds none."""
     axis = recordings[0].axis
@@ -61,6 +62,8 @@ def from_excitation(
         f"neither constant speeds nor breakaways were recorded: the law rests on excitation alone.{held_out} "
         "Torque ramps from rest would measure F_s, constant speeds from slow to fast v_s and beta."
     )
+    if assumptions.shape != "fixed":
+        text += " beta stays 1, though it was to be free: motion alone does not tell it."
     notes.append(Finding("E-TESTS", Severity.WARN, text))
     robot = IdentifiedRobot(
         inertia=values.inertia,

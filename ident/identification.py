@@ -67,7 +67,7 @@ def identify(
     law: Law = "each" if assumptions.laws == "each" else "one"
     excited = excited_law(excitations, law=law, axis=axis) if excitations else "no excitation log"
     if alone:
-        return from_excitation(recordings, evidence, excited)
+        return from_excitation(recordings, evidence, excited, assumptions)
     found = _from_evidence(recordings, evidence, assumptions=assumptions, generator=generator)
     return with_excitation(found, excited) if excitations else found
 

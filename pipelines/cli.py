@@ -55,7 +55,7 @@ def demo(
     from pipelines.settings.campaign import load_campaign
     from pipelines.virtual.demo_campaign import demo_campaign_text
     from pipelines.virtual_rig import record as record_on
-    from pipelines.whole_run import RunOptions, run_campaign
+    from pipelines.whole_run import RunOptions, read_truth, run_campaign
 
     place, text = out or OUTPUTS / "demo", demo_campaign_text(quick)
     owner = Owner(place.resolve().name, tomllib.loads(text)["rig"]["name"])
@@ -68,7 +68,7 @@ def demo(
         campaign = load_campaign(path)
         options = RunOptions(seed=seed, jobs=jobs)
         missing = run_campaign(campaign, folder, options, command="demo", progress=progress)
-    return _end_of_run(folder, missing, quiet=quiet, as_json=as_json)
+    return _end_of_run(folder, missing, read_truth(campaign), quiet=quiet, as_json=as_json)
 
 
 @app.command()
@@ -129,7 +129,7 @@ def identify(
     from pipelines.progress import shown_progress
     from pipelines.results.folder import open_results
     from pipelines.settings.campaign import load_campaign
-    from pipelines.whole_run import RunOptions, identify_campaign
+    from pipelines.whole_run import RunOptions, identify_campaign, read_truth
 
     loaded = load_campaign(campaign)
     folder = open_results(_place(out, loaded.owner), loaded.owner, force=force)
@@ -137,7 +137,7 @@ def identify(
     options = RunOptions(assumptions=assumptions, advised=advise, salvage=salvage, jobs=jobs)
     with shown_progress(quiet=quiet) as progress:
         missing = identify_campaign(loaded, folder, options, progress=progress)
-    _answer_table(folder, missing, quiet=quiet, as_json=as_json)
+    _answer_table(folder, missing, read_truth(loaded), quiet=quiet, as_json=as_json)
     return Status.WITHHELD if missing else Status.DONE
 
 
@@ -348,7 +348,7 @@ def run(
     from pipelines.progress import shown_progress
     from pipelines.results.folder import open_results
     from pipelines.settings.campaign import load_campaign
-    from pipelines.whole_run import RunOptions, run_campaign
+    from pipelines.whole_run import RunOptions, read_truth, run_campaign
 
     loaded = load_campaign(campaign)
     folder = open_results(_place(out, loaded.owner), loaded.owner, force=force)
@@ -364,7 +364,7 @@ def run(
     )
     with shown_progress(quiet=quiet) as progress:
         missing = run_campaign(loaded, folder, options, command="run", progress=progress)
-    return _end_of_run(folder, missing, quiet=quiet, as_json=as_json)
+    return _end_of_run(folder, missing, read_truth(loaded), quiet=quiet, as_json=as_json)
 
 
 @app.command()
@@ -445,28 +445,37 @@ def _answer(document: Mapping[str, object], lines: Sequence[object], *, quiet: b
         print(text.encode(encoding, "replace").decode(encoding))
 
 
-def _answer_table(folder: ResultFolder, missing: list[str], *, quiet: bool, as_json: bool) -> None:
-    table = (folder.path / "table1.md").read_text(encoding="utf-8")
-    lines = [table, *printed.withheld(missing)]
+def _answer_table(
+    folder: ResultFolder, missing: list[str], truth: Mapping[str, Any] | None, *, quiet: bool, as_json: bool
+) -> None:
+    from pipelines.report.tables import table1_text
+
+    robot = _document(folder, "robot.json")
+    lines: list[object] = [*table1_text(robot, truth=truth), *printed.withheld(missing)]
     if "advice.json" in folder.written:
         lines += printed.advice(_document(folder, "advice.json"))
-    _answer(_document(folder, "robot.json"), [*lines, folder.path], quiet=quiet, as_json=as_json)
+    _answer(robot, [*lines, folder.path], quiet=quiet, as_json=as_json)
 
 
-def _end_of_run(folder: ResultFolder, missing: list[str], *, quiet: bool, as_json: bool) -> Status:
+def _end_of_run(
+    folder: ResultFolder, missing: list[str], truth: Mapping[str, Any] | None, *, quiet: bool, as_json: bool
+) -> Status:
     """Table 1, the onsets, what is withheld, and where the report lies."""
+    from pipelines.report.tables import table1_text
+
     status = Status.WITHHELD if missing else Status.DONE
     names = sorted(folder.written)
     comparison = _document(folder, "comparison.json") if "comparison.json" in names else None
+    robot = _document(folder, "robot.json")
     summary = {
-        "simulated": _document(folder, "robot.json")["simulated"],
+        "simulated": robot["simulated"],
         "status": int(status),
         "withheld": missing,
         "written": names,
         "onset": None if comparison is None else comparison["onset"],
         "agreement": None if comparison is None else comparison["agreement"],
     }
-    lines: list[object] = [(folder.path / "table1.md").read_text(encoding="utf-8")]
+    lines: list[object] = [*table1_text(robot, truth=truth)]
     lines += [] if comparison is None else printed.comparison(comparison)
     lines += [*printed.withheld(missing), f"report: {folder.path / 'report.html'}"]
     _answer(summary, lines, quiet=quiet, as_json=as_json)

@@ -15,7 +15,7 @@ from dataclasses import astuple, fields, replace
 import numpy as np
 
 from data.recording import Axis
-from ident.advice import advise
+from ident.advice import advise, advise_without_map
 from ident.estimate import IdentifiedRobot
 from ident.evidence.friction_map import MapPoint
 from ident.fit.assumptions import DEFAULT, Assumptions
@@ -73,7 +73,8 @@ def write_identification(
     folder.write_text("table1.tex", table1_tex(document, truth=truth))
     if advised:
         units = {**UNITS[axis], "critical_observer_gain": "1/s"}
-        advice = () if found.weighted is None else advise(found.evidence, found.weighted)
+        weighted = found.weighted
+        advice = advise_without_map() if weighted is None else advise(found.evidence, weighted)
         write_advice(folder, advice, units)
     figure = figure2(found.friction_map, robot.robot(), axis=axis, simulated=robot.simulated)
     folder.write_text("figure2.svg", svg_text(figure))

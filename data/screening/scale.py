@@ -13,6 +13,8 @@ from data.screening.run import Run
 # Largest torque [N m] or position [rad] of a log, below and above which its scale is wrong.
 SMALLEST: Final = 1e-12
 LARGEST: Final = 1e12
+FEWEST_COUNTS: Final = 10  # of a piece of motion over which a velocity is held against the position
+FEWEST_PIECES: Final = 5
 FAR_BEYOND: Final = 3.0  # times the torque limit
 _LOOKS_LIKE: Final = (
     (180.0 / math.pi, "the velocity looks like deg/s"),
@@ -63,11 +65,16 @@ def require_velocity_unit(run: Run, resolution: float | None) -> None:
         return
     step = np.diff(run.time)
     way = np.cumsum(0.5 * (run.velocity[1:] + run.velocity[:-1]) * step)
-    marks = np.unique(np.linspace(0, step.size - 1, min(200, max(2, step.size // 5))).astype(int))
+    pieces = min(200.0, step.size / 5.0)
+    if resolution:
+        pieces = min(pieces, float(np.sum(np.abs(np.diff(run.position)))) / (FEWEST_COUNTS * resolution))
+    if pieces < FEWEST_PIECES:
+        return
+    marks = np.unique(np.linspace(0, step.size - 1, int(pieces)).astype(int))
     logged = np.diff(way[marks])
     measured = np.diff(run.position[1:][marks])
     moved = float(np.sum(measured**2))
-    if math.sqrt(moved) < 50.0 * (resolution or 0.0) + 1e-12 or float(np.sum(logged**2)) == 0.0:
+    if math.sqrt(moved) < 20.0 * (resolution or 0.0) + 1e-12 or float(np.sum(logged**2)) == 0.0:
         return
     factor = float(np.sum(logged * measured)) / moved
     likeness = factor * math.sqrt(moved / float(np.sum(logged**2)))  # the correlation through the origin

@@ -10,8 +10,8 @@ commercial arm from 3.0 to 5.2 N m over five rates. Two models are held against 
 c of each direction, in weighted least squares with one scatter for all. A logarithm alone has no limit at
 rest, so u'_0 has to be finite; it is looked for from a tenth of the slowest rate to ten times the fastest,
 beyond which the second model is the first. The trend is taken where its F ratio could hardly be chance, and
-where it is more than a delay of detection that is wrong in all ramps alike would make of none: that too grows
-with the rate.
+where it is more than what all ramps of a rate, often of one log, may share would make of none: a delay of
+detection that is wrong in all alike, and the spread from run to run that the steady runs show.
 
 For the zero-rate value the models are averaged, every u'_0 by its likelihood, and its error holds the error
 within each and the spread between them (Burnham and Anderson 2002, sec. 4.3): a line and a logarithm that
@@ -37,7 +37,7 @@ REACH: Final = 10.0  # by which u'_0 may lie below the slowest and above the fas
 CHANCE: Final = 0.001  # of a trend where there is none, for each of two shapes
 APART: Final = 1.3  # ratio of two rates that differ
 TINY: Final = float(np.finfo(np.float64).tiny)
-DELAYED: Final = 3.0  # times the error that the delay may bring
+CLEAR: Final = 3.0  # times the shared error
 MATTERS: Final = 0.005  # part of F_s by which it has to rise or fall
 SPARE: Final = 3  # least number of breakaways beyond the parameters
 
@@ -84,7 +84,7 @@ def rate_trend(
     rate: FloatArray,
     torque: FloatArray,
     stderr: FloatArray,
-    delay_error: FloatArray,
+    shared_error: FloatArray,
 ) -> RateTrend | None:
     """The trend over the rates, or None where there is none to speak of.
 
@@ -94,7 +94,7 @@ def rate_trend(
     rate : (m,) magnitudes [N m/s]
     torque : (m,) at the onset, magnitudes [N m]
     stderr : (m,) of it, correct up to a common factor [N m]
-    delay_error : (m,) part of it that may be the same in all [N m]
+    shared_error : (m,) what may be wrong in all breakaways of a rate alike [N m]
     """
     told = [sign for sign in (1, -1) if _several(rate[direction == sign])]
     seen = np.isin(direction, told)
@@ -124,7 +124,7 @@ def rate_trend(
         rise = float(excess[own][np.argmax(rate[own])])
         mean_error = float(np.sum(stderr[own] ** -2.0)) ** -0.5
         zero[sign] = ZeroRate(value, error, rise, error / mean_error)
-    least = max(MATTERS * float(np.median(torque[seen])), DELAYED * float(delay_error[seen].max()))
+    least = max(MATTERS * float(np.median(torque[seen])), CLEAR * float(shared_error[seen].max()))
     if max(abs(found.rise) for found in zero.values()) < least:
         return None
     shape: RateShape = "logarithmic" if preference > 0 else "linear"

@@ -198,7 +198,9 @@ def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: Spre
     total = known + by_group.sum(axis=0)
     start_stderr = np.sqrt(total[runs:])
     rate = np.array([abs(start.line.rate) for start in evidence.used_starts])
-    trend = rate_trend(data.start_direction, rate, start_torque, start_stderr, delay_error)
+    of_runs = np.where(data.start_direction > 0, spread.variances[0], spread.variances[1])
+    shared_error = np.hypot(delay_error, np.sqrt(of_runs))
+    trend = rate_trend(data.start_direction, rate, start_torque, start_stderr, shared_error)
     if trend is not None:
         start_torque = start_torque - trend.excess
         start_stderr = start_stderr * trend.widening(data.start_direction)

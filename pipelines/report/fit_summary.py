@@ -13,7 +13,7 @@ from typing import Any, Final
 from data.names import shown
 from pipelines.report.axis_units import AxisUnits, units_of
 from pipelines.report.numerals import shown_number
-from pipelines.report.tables import WORDS, Entry, table1_entries
+from pipelines.report.tables import WORDS, Entry, reasons_withheld, table1_entries
 
 _WIDTH: Final = 100
 _LONGEST: Final = 1500
@@ -54,13 +54,13 @@ def _values(entries: Iterable[Entry]) -> list[str]:
     return lines
 
 
-def _withheld(entries: Iterable[Entry]) -> list[str]:
-    reasons: dict[str, list[str]] = {}
-    for entry in entries:
-        if entry.value is None and entry.direction != "mean":
-            name = f"{entry.symbol} ({entry.direction})" if entry.direction else entry.symbol
-            reasons.setdefault(shown(entry.withheld or "", _LONGEST), []).append(name)
-    return [line for why, names in reasons.items() for line in _item(f"{', '.join(names)}: {why}")]
+def _withheld(entries: Sequence[Entry]) -> list[str]:
+    own = [entry for entry in entries if entry.direction != "mean"]
+    lines = []
+    for why, lacking in reasons_withheld(own).items():
+        names = (f"{one.symbol} ({one.direction})" if one.direction else one.symbol for one in lacking)
+        lines += _item(f"{', '.join(names)}: {shown(why, _LONGEST)}")
+    return lines
 
 
 def _basis(robot: Mapping[str, Any], units: AxisUnits) -> list[str]:

@@ -7,7 +7,7 @@ truth that the virtual rig moved by stands beside, and the table says so.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -99,33 +99,64 @@ def table1_csv(robot: Mapping[str, Any], *, truth: Mapping[str, Any] | None = No
 
 def table1_markdown(robot: Mapping[str, Any], *, truth: Mapping[str, Any] | None = None) -> str:
     """One row a parameter, a column a direction, the paper's value after each."""
-    directions = list(DIRECTIONS)
     entries = table1_entries(robot, truth=truth)
+    inertia, beside = entries[0], references(entries)
     head = ["parameter"]
-    for direction in directions:
-        head += [DIRECTIONS[direction], "paper", *(["truth"] if truth else [])]
+    for direction in DIRECTIONS.values():
+        head += [direction, *beside]
     lines = [_line(head), _line(["---"] * len(head))]
     for parameter, symbol in SYMBOLS.items():
         own = [entry for entry in entries if entry.parameter == parameter]
         cells = [f"{symbol} [{_markdown(own[0].unit)}]"]
         for entry in own:
-            cells += [_markdown_value(entry), shown_number(entry.paper)]
-            cells += [shown_number(entry.truth)] if truth else []
+            cells += [_valued(entry), *(shown_number(getattr(entry, name)) for name in beside)]
         lines.append(_line(cells))
-    inertia = entries[0]
-    told = f", truth {shown_number(inertia.truth)}" if truth else ""
+    told = ", ".join(f"{name} {shown_number(getattr(inertia, name))}" for name in beside)
     lines += [
         "",
-        f"Inertia J [{_markdown(inertia.unit)}]: {_markdown_value(inertia)} "
-        f"(paper {shown_number(inertia.paper)}{told}). Brackets are 95 % intervals.",
+        f"Inertia J [{_markdown(inertia.unit)}]: {_valued(inertia)}{f' ({told})' if told else ''}. "
+        "Brackets are 95 % intervals.",
     ]
-    reasons = [
-        f"- {entry.symbol} {DIRECTIONS.get(entry.direction, '')}: withheld: {_markdown(entry.withheld)}"
-        for entry in entries
-        if entry.withheld
-    ]
+    reasons = []
+    for why, lacking in reasons_withheld(entries).items():
+        symbols = (f"{entry.symbol} {DIRECTIONS.get(entry.direction, '')}".strip() for entry in lacking)
+        reasons.append(f"- {', '.join(symbols)}: withheld: {_markdown(why)}")
     label = [f"**{SIMULATED[0].upper()}{SIMULATED[1:]}.**", ""] if robot.get("simulated") else []
     return "\n".join([*label, *lines, *(["", *reasons] if reasons else [])]) + "\n"
+
+
+def table1_text(robot: Mapping[str, Any], *, truth: Mapping[str, Any] | None = None) -> list[str]:
+    """Lines for a terminal, a row a parameter and direction; why something is withheld is said elsewhere."""
+    entries = table1_entries(robot, truth=truth)
+    beside = references(entries)
+    heading = f"Table 1{f', {SIMULATED.upper()}' if robot.get('simulated') else ''}: values [95 % intervals]"
+    lines = [f"{heading:58}{''.join(f'{name:>10}' for name in beside)}".rstrip()]
+    for direction in ("", *DIRECTIONS):
+        own = [entry for entry in entries if entry.direction == direction]
+        if direction:
+            lines.append(f"{DIRECTIONS[direction]}")
+        if all(entry.value is None for entry in own):
+            lines.append("  withheld")
+            continue
+        for entry in own:
+            known = "".join(f"{shown_number(getattr(entry, name)):>10}" for name in beside)
+            label = f"  {entry.symbol:3} {shown(entry.unit):13}"
+            lines.append(f"{label} {_valued(entry):40}{known}".rstrip())
+    return lines
+
+
+def references(entries: Sequence[Entry]) -> list[str]:
+    """What stands beside the values: "paper" and "truth", where there is any of it."""
+    return [name for name in ("paper", "truth") if any(getattr(entry, name) is not None for entry in entries)]
+
+
+def reasons_withheld(entries: Sequence[Entry]) -> Mapping[str, list[Entry]]:
+    """Why something is withheld -> all that is withheld for it."""
+    reasons: dict[str, list[Entry]] = {}
+    for entry in entries:
+        if entry.value is None:
+            reasons.setdefault(entry.withheld or "", []).append(entry)
+    return reasons
 
 
 def table1_tex(robot: Mapping[str, Any], *, truth: Mapping[str, Any] | None = None) -> str:
@@ -143,9 +174,9 @@ def table1_tex(robot: Mapping[str, Any], *, truth: Mapping[str, Any] | None = No
         own = [entry for entry in entries if entry.parameter == parameter]
         name = f"${_TEX[symbol]}$ [{_tex(own[0].unit)}]"
         lines.append(" & ".join([name, *map(_tex_value, own)]) + r" \\")
-        lines.append(" & ".join([r"\quad paper", *(_tex_number(entry.paper) for entry in own)]) + r" \\")
-        if truth:
-            lines.append(" & ".join([r"\quad truth", *(_tex_number(entry.truth) for entry in own)]) + r" \\")
+        for reference in references(entries):
+            known = (_tex_number(getattr(entry, reference)) for entry in own)
+            lines.append(" & ".join([rf"\quad {reference}", *known]) + r" \\")
     lines += [r"\hline", r"\end{tabular}"]
     lines += [f"% $J$ = {_tex_value(entries[0])} {_tex(entries[0].unit)}"]
     return "\n".join(lines) + "\n"
@@ -209,7 +240,7 @@ def _line(cells: list[str]) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def _markdown_value(entry: Entry) -> str:
+def _valued(entry: Entry) -> str:
     if entry.value is None:
         return "withheld"
     return (

@@ -106,15 +106,22 @@ class RobotFile:
         return robot.mean()
 
     def missing(self) -> list[str]:
-        """A sentence for each parameter that is withheld."""
+        """A sentence for each reason for which something is withheld."""
         return [] if self.identified is None else withheld_parameters(self.identified)
 
 
 def withheld_parameters(robot: IdentifiedRobot) -> list[str]:
-    """A sentence for each parameter that the robot needs and that is withheld."""
+    """A sentence for each reason for which parameters that the robot needs are withheld."""
     entries = {"inertia": robot.inertia}
     entries |= {f"{key}.{name}": law[name] for key, law in robot.laws().items() for name in CURVE_PARAMETERS}
-    return [f"{name} is withheld: {entry.withheld}" for name, entry in entries.items() if entry.value is None]
+    reasons: dict[str | None, list[str]] = {}
+    for name, entry in entries.items():
+        if entry.value is None:
+            reasons.setdefault(entry.withheld, []).append(name)
+    return [
+        f"{', '.join(names)} {'is' if len(names) == 1 else 'are'} withheld: {why}"
+        for why, names in reasons.items()
+    ]
 
 
 def paper_robot() -> RobotFile:

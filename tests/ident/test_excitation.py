@@ -53,6 +53,12 @@ def test_a_torque_of_the_wrong_sign_is_refused() -> None:
         identify([replace(RECORDING, torque=-RECORDING.torque)])
 
 
+def test_a_free_beta_is_told_to_have_no_effect_on_motion_alone() -> None:
+    notes = identify([RECORDING], assumptions=Assumptions(shape="free")).robot.notes
+    assert any("beta stays 1" in note.text for note in notes)
+    assert not any("beta stays 1" in note.text for note in identify([RECORDING]).robot.notes)
+
+
 def test_beside_other_logs_the_inertia_stands_where_there_is_no_other() -> None:
     alone = identify([RECORDING])
     excited = excited_law([RECORDING], law="one", axis="rotary")

@@ -182,6 +182,14 @@ def test_the_count_is_found_on_a_lattice_and_nowhere_else(count: float, speed: f
 def test_a_straight_line_has_no_count() -> None:
     assert lattice_spacing(np.arange(5000, dtype=np.float64) * 0.005) is None
     assert lattice_spacing(np.zeros(100)) is None
+    lost = np.delete(np.arange(5000, dtype=np.float64), np.arange(40, 4000, 100)) * 0.005
+    assert lattice_spacing(lost) is None  # doubled steps of lost samples
+
+
+@pytest.mark.parametrize("counts", [0.31, 2.6, 35.4, 12_345.6])  # a sample, of an even motion
+def test_a_count_is_found_however_fast_an_even_motion_is(counts: float) -> None:
+    position = 0.0123 * np.rint(counts * np.arange(500))
+    assert lattice_spacing(position) == pytest.approx(0.0123, rel=1e-6)
 
 
 def test_positions_in_another_unit_than_the_declared_count_are_refused() -> None:
