@@ -311,6 +311,18 @@ def start_inertia(data: FitData) -> float | None:
     return float(np.median(sound)) if sound else None
 
 
+def fit_from(data: FitData, begun: FrictionFit, earlier: FrictionFit) -> FrictionFit:
+    """The minimum near a start that is better than an earlier fit's, which is then the other one."""
+    fit = fit_friction(data, start=begun)
+    others = [(earlier.values, earlier.chi_square)]
+    if earlier.other_minimum is not None:
+        square = float(np.sum(residuals(data, earlier.other_minimum) ** 2))
+        others.append((earlier.other_minimum, square))
+    points = np.array([vector(data, values) for values in (fit.values, *(own for own, _ in others))])
+    cost = np.array([fit.chi_square, *(square for _, square in others)])
+    return replace(fit, other_minimum=_other_minimum(data, points, cost))
+
+
 def _other_minimum(data: FitData, points: FloatArray, cost: FloatArray) -> Mapping[str, float] | None:
     """A minimum that fits as well as the best with another v_s; points (s, p) and cost (s,) best first."""
     for other in points[1:][cost[1:] <= cost[0] + SAME]:

@@ -18,7 +18,7 @@ from data.recording import FloatArray
 from ident.estimate import ProfilePoints
 from ident.fit.confidence import Interval
 from ident.fit.fit_data import FitData
-from ident.fit.friction_fit import FrictionFit, fit_friction, named, vector
+from ident.fit.friction_fit import FrictionFit, fit_from, named, vector
 from ident.fit.law_model import BLOCK, LawName
 from ident.fit.refits import BETTER, BOUND, MOST_POINTS, REACHED, profile_end, refit_each
 
@@ -89,7 +89,7 @@ def _profile(
         )
         if ended == BETTER:
             begun = FrictionFit(data.model, named(data, x), fit.free, fit.covariance, cost[0], None)
-            return Profile(_by_value(points), Interval(None, None)), fit_friction(data, start=begun)
+            return Profile(_by_value(points), Interval(None, None)), fit_from(data, begun, fit)
         points.append(memory[:count].copy())
         closed = limit if ended == BOUND and known else None
         ends.append(float(memory[count - 1, 0]) if ended == REACHED else closed)

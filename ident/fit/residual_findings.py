@@ -32,7 +32,7 @@ from ident.fit.residual_tests import runs_test
 from ident.fit.weighting import Weighted, law_slopes
 
 WAVES = 6  # slow ones over the ranks of the speeds
-DRIFT_CHANCE = 5e-4  # of a drift: dated logs that were run in order of speed leave few data to tell
+DRIFT_CHANCE = 2e-3  # of a drift, of those that are large enough to matter
 DRIFT_MATTERS = 0.005  # part of the friction by which a drift over the recording is worth a word
 WITHIN_MATTERS = 0.02  # and one within runs, which still may settle
 LEAST_ALIKE = 12  # runs that may change alike by chance

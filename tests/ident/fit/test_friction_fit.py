@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from data.recording import FloatArray
 from ident.fit.fit_data import FitData
-from ident.fit.friction_fit import SAME, FrictionFit, fit_friction, polished, residuals
+from ident.fit.friction_fit import SAME, FrictionFit, fit_friction, fit_from, polished, residuals
 from ident.fit.law_model import DIRECTIONS, EACH, LawModel
 from tests.ident.fit.campaigns import ONE_LAW, TRUTH, simulated
 
@@ -122,5 +122,9 @@ def test_of_two_minima_the_better_one_wins_and_the_other_is_told() -> None:
         other = fit_friction(data, start=replace(fit, values=fit.other_minimum))
         assert other.chi_square >= fit.chi_square - 1e-9
         assert other.chi_square <= fit.chi_square + SAME + 1e-6
+        # Had the fit been at the other one first, it would be the other one now.
+        again = fit_from(data, fit, other)
+        assert again.other_minimum is not None
+        assert again.other_minimum == pytest.approx(other.values, rel=1e-4, abs=1e-9)
         found.append(seed)
     assert found
