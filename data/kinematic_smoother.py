@@ -12,8 +12,6 @@ carried out in full throughout. filterpy's `batch_filter` and `rts_smoother` do 
 sample and are what this is tested against, except that they take a covariance as a difference (see below)
 and lose its digits where S is small.
 
-All kernels stand in this one file, so that numba's cache, whose key is the file, cannot go stale.
-
 Source: Rauch, Tung, Striebel, AIAA Journal 3 (1965); Bar-Shalom, Li, Kirubarajan, Estimation with
 Applications to Tracking and Navigation (2001), section 6.2.3.
 """
@@ -21,24 +19,18 @@ Applications to Tracking and Navigation (2001), section 6.2.3.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Final, ParamSpec, TypeVar, cast
+from typing import Final
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from data.compiled import kernel
+
 FloatArray = NDArray[np.float64]
 _SETTLED: Final = 1e-14  # change of a covariance in a step, in parts of it, that rounding alone makes
-P = ParamSpec("P")
-R = TypeVar("R")
 
 
-def _kernel(function: Callable[P, R]) -> Callable[P, R]:
-    return cast("Callable[P, R]", numba.njit(cache=True, nogil=True, error_model="numpy")(function))
-
-
-@_kernel
+@kernel
 def _carry(spread: FloatArray, step: float, density: float, ahead: FloatArray) -> None:
     """Covariance (3, 3) after a step: F P F' + Q into `ahead`."""
     h = step
@@ -62,7 +54,7 @@ def _carry(spread: FloatArray, step: float, density: float, ahead: FloatArray) -
     ahead[2, 2] += density * h
 
 
-@_kernel
+@kernel
 def _measured(prior: FloatArray, gain: FloatArray, posterior: FloatArray) -> None:
     """Gain (3,) of a measurement of q with unit noise, and the covariance after it (Joseph's form)."""
     for i in range(3):
@@ -76,7 +68,7 @@ def _measured(prior: FloatArray, gain: FloatArray, posterior: FloatArray) -> Non
             posterior[i, j] = kept[i, j] - kept[i, 0] * gain[j] + gain[i] * gain[j]
 
 
-@_kernel
+@kernel
 def _backward_gain(posterior: FloatArray, step: float, ahead: FloatArray, gain: FloatArray) -> None:
     """The smoother's gain P F' (F P F' + Q)^-1 into `gain` (3, 3), by Cholesky."""
     low = np.zeros((3, 3))
@@ -103,7 +95,7 @@ def _backward_gain(posterior: FloatArray, step: float, ahead: FloatArray, gain: 
             gain[i, j] = row[j]
 
 
-@_kernel
+@kernel
 def _same(one: FloatArray, other: FloatArray) -> bool:
     for i in range(3):
         for j in range(3):
@@ -113,7 +105,7 @@ def _same(one: FloatArray, other: FloatArray) -> bool:
     return True
 
 
-@_kernel
+@kernel
 def _smooth_back(
     spread: FloatArray, step: float, density: float, gain: FloatArray, after: FloatArray, out: FloatArray
 ) -> None:
@@ -141,7 +133,7 @@ def _smooth_back(
             out[i, j] = total
 
 
-@_kernel
+@kernel
 def smooth(
     steps: FloatArray, even: bool, position: FloatArray, density: float, start: FloatArray, doubt: FloatArray
 ) -> FloatArray:

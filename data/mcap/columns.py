@@ -1,8 +1,8 @@
 """Columns of numbers out of an MCAP file, straight from its blocks where that can be proved.
 
-Messages of `sensor_msgs/msg/JointState` that share a layout (see `joint_state`) are taken as arrays; the
-proof is made for every message, and those that fit no layout go through the ordinary decoder one by one, as
-all other messages do. Both ways give the same numbers, bit for bit.
+Binary messages that share a layout (`layout`) are taken as arrays, JSON ones a block at a time
+(`json_block`); the proof is made for every message, and those that cannot be proved go through the ordinary
+decoder one by one. Both ways give the same numbers, bit for bit.
 
 Each topic keeps its three clocks: the log time (when the recorder got a message), the publish time, and the
 stamp in the message's own header where it has one.
@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 from mcap.records import Channel
@@ -21,17 +22,20 @@ from numpy.typing import NDArray
 
 from data.findings import LogError
 from data.integrity import Integrity
-from data.mcap import joint_state
-from data.mcap.decoding import Decode, decoder
+from data.mcap.decoding import Decode, Recognise, decoder, recogniser
 from data.mcap.field_path import FieldPath, Number, resolve, resolve_exactly
-from data.mcap.records import ByteArray, gather
+from data.mcap.layout import Layout, Place, numbers, place, prove, stamps
+from data.mcap.records import ByteArray
+from data.mcap.stamp import NO_STAMP, header_stamp
 from data.mcap.walk import Block, McapWalk
 from data.names import nearest, shown
+
+if TYPE_CHECKING:
+    from data.mcap.json_block import JsonBlock
 
 FloatArray = NDArray[np.float64]
 TimeArray = NDArray[np.int64]
 _MOST_LAYOUTS = 16  # of one topic, before its messages are decoded one by one
-_NO_STAMP = np.iinfo(np.int64).min
 
 
 @dataclass(frozen=True)
@@ -119,16 +123,15 @@ def _reader(
 ) -> _ChannelReader:
     clock = clock if clock in paths else None
     schema = walk.schemas.get(channel.schema_id) if channel.schema_id else None
-    plain = (
-        clock is None
-        and channel.message_encoding == "cdr"
-        and schema is not None
-        and schema.encoding == "ros2msg"
-        and joint_state.is_joint_state(schema.name, schema.data.decode(errors="replace"))
-        and all(len(path.steps) == 1 and path.steps[0].name in joint_state.SIGNALS for path in paths)
-    )
     decode = decoder(channel, schema, exact=clock is not None)
-    return _ChannelReader(paths=paths, decode=decode, plain=plain, clock=clock)
+    if clock is not None:
+        return _ChannelReader(paths, decode, clock=clock)
+    if channel.message_encoding == "json" and walk.large:
+        from data.mcap.json_block import JsonBlock  # noqa: PLC0415  # few logs need it
+
+        if JsonBlock.can_read(paths):
+            return _ChannelReader(paths, decode, json=JsonBlock(paths))
+    return _ChannelReader(paths, decode, recognise=recogniser(channel, schema), large=walk.large)
 
 
 def _topic(walk: McapWalk, topic: str, readers: Mapping[int, _ChannelReader]) -> Topic:
@@ -163,10 +166,12 @@ class _ChannelReader:
 
     paths: list[FieldPath]
     decode: Decode
-    plain: bool  # whether a layout may be proved
+    recognise: Recognise | None = None  # how a layout is found, where one may be proved
+    json: JsonBlock | None = None  # reads a block at once
     clock: FieldPath | None = None  # which of the paths is the time
+    large: bool = False  # whether the file is worth compiled code
     singly: int = 0
-    layouts: list[joint_state.Layout] = field(default_factory=list)
+    layouts: list[tuple[Layout, list[Place]]] = field(default_factory=list)
     columns: list[FloatArray] = field(default_factory=list)  # (paths, n) a block
     clocks: list[TimeArray] = field(default_factory=list)  # (3, n) a block: log, publish, header
     ticks: list[Decimal] = field(default_factory=list)
@@ -177,10 +182,15 @@ class _ChannelReader:
         mine = np.flatnonzero(found.channel == number)
         begin, length = found.begin[mine], found.length[mine]
         values = np.empty((len(self.paths), mine.size))
-        header = np.full(mine.size, _NO_STAMP, np.int64)
+        header = np.full(mine.size, NO_STAMP, np.int64)
         left = np.ones(mine.size, np.bool_)
-        if self.plain:
-            self._take_layouts(block, begin=begin, length=length, left=left, values=values, header=header)
+        if self.recognise is not None:
+            self._take_layouts(
+                block, self.recognise, begin=begin, length=length, left=left, values=values, header=header
+            )
+        if self.json is not None:
+            read, numbers_read, stamps_read = self.json.read(block.data, begin, length)
+            values[:, read], header[read], left = numbers_read, stamps_read, ~read
         for k in np.flatnonzero(left).tolist():
             raw = block.data[int(begin[k]) : int(begin[k] + length[k])].tobytes()
             message = self.decode(raw)
@@ -195,6 +205,7 @@ class _ChannelReader:
     def _take_layouts(
         self,
         block: Block,
+        recognise: Recognise,
         *,
         begin: NDArray[np.int64],
         length: NDArray[np.int64],
@@ -207,22 +218,25 @@ class _ChannelReader:
         while left.any() and tried < _MOST_LAYOUTS:
             if tried == len(self.layouts):
                 k = int(np.argmax(left))
-                shape = joint_state.recognise(block.data[int(begin[k]) : int(begin[k] + length[k])].tobytes())
-                if shape is None:
+                shape = recognise(block.data[int(begin[k]) : int(begin[k] + length[k])].tobytes())
+                places = [place(shape, path) for path in self.paths] if shape is not None else []
+                known = [own for own in places if own is not None]
+                if shape is None or len(known) < len(self.paths):
                     return
-                self.layouts.append(shape)
-            shape = self.layouts[tried]
+                self.layouts.append((shape, known))
+            shape, known = self.layouts[tried]
             tried += 1
             candidates = np.flatnonzero(left & (length == shape.size))
+            proved = prove(shape, block.data, begin[candidates], large=self.large)
+            candidates = candidates[proved]
             if not candidates.size:
                 continue
-            rows = gather(block.data, begin[candidates], shape.size)
-            proved = joint_state.matches(shape, rows)
-            if not proved.all():
-                candidates, rows = candidates[proved], rows[proved]
-            for row, path in enumerate(self.paths):
-                values[row, candidates] = joint_state.numbers(rows, _place(shape, path))
-            header[candidates] = joint_state.stamps(rows)
+            where = begin[candidates]
+            for row, own in enumerate(known):
+                values[row, candidates] = numbers(block.data, where, own)
+            stamped = stamps(shape, block.data, where)
+            if stamped is not None:
+                header[candidates] = stamped
             left[candidates] = False
 
     def topic(self) -> Topic:
@@ -233,57 +247,10 @@ class _ChannelReader:
             values={path.text: values[row] for row, path in enumerate(self.paths)},
             log_time=clocks[0],
             publish_time=clocks[1],
-            header_time=clocks[2] if np.all(clocks[2] != _NO_STAMP) else None,
+            header_time=clocks[2] if np.all(clocks[2] != NO_STAMP) else None,
             ticks=tuple(self.ticks),
         )
 
 
 def _exact(value: Number) -> Decimal:
     return Decimal(value.item() if isinstance(value, np.integer | np.floating) else value)
-
-
-def _place(shape: joint_state.Layout, path: FieldPath) -> int:
-    """Where the path's number stands in messages of a layout.
-
-    Raises
-    ------
-    LogError
-        When the joint or the element is not there.
-    """
-    step = path.steps[0]
-    count = shape.count(step.name)
-    index = step.index
-    if step.joint is not None:
-        if step.joint not in shape.names:
-            raise LogError(
-                f"{path.text}: no joint {step.joint!r}; the log has {nearest(step.joint, shape.names)}"
-            )
-        index = shape.names.index(step.joint)
-    elif index is None:
-        if count != 1:
-            raise LogError(
-                f"{path.text} is an array of {count} elements; say which, by [i] from 0 or {{joint}}"
-            )
-        index = 0
-    if index >= count:
-        raise LogError(f"{path.text}: {step.name} has {count} elements, so there is no element {index}")
-    return shape.place(step.name) + 8 * index
-
-
-def header_stamp(message: object) -> int:
-    """A decoded message's own stamp [ns], or the least integer where it has none."""
-    header = _get(message, "header")
-    stamp = _get(header, "stamp")
-    seconds = _get(stamp, "sec", "secs")
-    rest = _get(stamp, "nanosec", "nsec", "nsecs")
-    if not isinstance(seconds, int) or not isinstance(rest, int) or abs(seconds) > 2**33 or abs(rest) > 2**33:
-        return _NO_STAMP
-    return seconds * 1_000_000_000 + rest
-
-
-def _get(value: object, *names: str) -> object:
-    for name in names:
-        inside = value.get(name) if isinstance(value, Mapping) else getattr(value, name, None)
-        if inside is not None:
-            return inside
-    return None

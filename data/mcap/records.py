@@ -2,9 +2,7 @@
 
 A record is one byte of opcode, eight of length, then the content. Every length is checked against the bytes
 that are there before anything is read or allocated. `tile` finds the records of a block (a chunk's content,
-or a stretch of a file without chunks): it steps from record to record, and where they repeat, as the messages
-of a steady rig do, proves whole runs at once by comparing every record's header with the one a period
-before.
+or a stretch of a file without chunks): it steps from record to record.
 
 `parse` hands a record's content to mcap's own parser, bounded to that content: whatever goes wrong inside
 becomes a `Damage` with the place. Source: https://mcap.dev/spec (version 0).
@@ -14,7 +12,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from io import BytesIO
 from typing import Final, TypeVar
 
@@ -22,6 +20,7 @@ import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 ByteArray = NDArray[np.uint8]
@@ -29,7 +28,6 @@ Record = TypeVar("Record")
 HEADER: Final = struct.Struct("<BQ")
 MESSAGE_PREFIX: Final = 22  # channel, sequence, log time, publish time
 _PREFIX: Final = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")])
-_LONGEST_PERIOD: Final = 4  # topics that take turns
 _MOST_RECORDS: Final = 4_000_000  # in one block
 _LATEST: Final = np.iinfo(np.int64).max
 
@@ -91,8 +89,10 @@ def parse(reader: Callable[[ReadDataStream], Record], content: bytes, *, where: 
         raise Damage(where, f"the {name} record there contradicts itself ({error})") from error
 
 
-def tile(block: ByteArray, *, begin: int = 0, within: frozenset[int] | None = None) -> Tiling:
-    """Find the records of a block, from `begin` on.
+def tile(
+    block: ByteArray, *, begin: int = 0, within: frozenset[int] | None = None, large: bool = False
+) -> Tiling:
+    """Find the records of a block, from `begin` on; compiled where it is part of a `large` file.
 
     With `within`, stop at the first record that is damaged or whose opcode is not among these.
 
@@ -101,36 +101,44 @@ def tile(block: ByteArray, *, begin: int = 0, within: frozenset[int] | None = No
     Damage
         Without `within`, when a record does not fit into what is left, has opcode 0, or there are too many.
     """
-    raw, size = block.data, block.size
-    runs: list[tuple[list[int], list[int], int]] = []  # opcodes and lengths, and how often they are repeated
-    opcodes: list[int] = []
+    among = np.zeros(256, np.bool_)
+    among[list(within) if within is not None else range(1, 256)] = True
+    tiling = _scanned(block, begin, among) if large else _stepped(block, begin, among)
+    if within is None and tiling.end < block.size:
+        why, _, _ = look(block.data, tiling.end, block.size)
+        raise Damage(tiling.end, why or f"more than {_MOST_RECORDS} records in one chunk")
+    return tiling
+
+
+def _scanned(block: ByteArray, begin: int, among: NDArray[np.bool_]) -> Tiling:
+    from data.mcap.scan import scan  # noqa: PLC0415  # numba takes long to load
+
+    def pass_over(count: int) -> tuple[Tiling, int]:
+        found = Tiling(np.empty(count, np.uint8), np.empty(count, np.int64), np.empty(count, np.int64), 0)
+        seen, end = scan(block, begin, among, _MOST_RECORDS, found.opcode, found.begin, found.length)
+        return replace(found, end=end), seen
+
+    _, count = pass_over(0)
+    return pass_over(count)[0]
+
+
+def _stepped(block: ByteArray, begin: int, among: NDArray[np.bool_]) -> Tiling:
+    raw, size, allowed = block.data, block.size, among.tolist()
+    opcodes = bytearray()
+    begins: list[int] = []
     lengths: list[int] = []
-    total, here = 0, begin
-    while here < size:
+    here = begin
+    while here < size and len(begins) < _MOST_RECORDS:
         why, opcode, length = look(raw, here, size)
-        if within is not None and (why or opcode not in within or total >= _MOST_RECORDS):
+        if why or not allowed[opcode]:
             break
-        if why or total >= _MOST_RECORDS:
-            raise Damage(here, why or f"more than {_MOST_RECORDS} records in one chunk")
         opcodes.append(opcode)
+        begins.append(here + HEADER.size)
         lengths.append(length)
-        total += 1
         here += HEADER.size + length
-        period = _period(opcodes, lengths)
-        if period:
-            cycle = lengths[-period:]
-            stride = period * HEADER.size + sum(cycle)
-            rounds = _rounds(block, here, stride=stride, lengths=cycle)
-            if rounds:
-                runs += [(opcodes, lengths, 1), (opcodes[-period:], cycle, rounds)]
-                opcodes, lengths = [], []
-                total += rounds * period
-                here += rounds * stride
-    runs.append((opcodes, lengths, 1))
-    opcode_array = np.concatenate([np.tile(np.array(run[0], np.uint8), run[2]) for run in runs])
-    length_array = np.concatenate([np.tile(np.array(run[1], np.int64), run[2]) for run in runs])
-    ends = begin + np.cumsum(length_array + HEADER.size)
-    return Tiling(opcode=opcode_array, begin=ends - length_array, length=length_array, end=here)
+    return Tiling(
+        np.frombuffer(bytes(opcodes), np.uint8), np.array(begins, np.int64), np.array(lengths, np.int64), here
+    )
 
 
 def look(raw: memoryview, here: int, size: int) -> tuple[str, int, int]:
@@ -144,39 +152,6 @@ def look(raw: memoryview, here: int, size: int) -> tuple[str, int, int]:
     if length > left:
         return f"a record (opcode {opcode}) claims {length} bytes, {left} are left", opcode, length
     return "", opcode, length
-
-
-def _period(opcodes: list[int], lengths: list[int]) -> int:
-    """How many records ago the last ones began to repeat; 0: they do not."""
-    for period in range(1, min(_LONGEST_PERIOD, len(opcodes) // 2) + 1):
-        if (
-            lengths[-1] == lengths[-1 - period]
-            and lengths[-period:] == lengths[-2 * period : -period]
-            and opcodes[-period:] == opcodes[-2 * period : -period]
-        ):
-            return period
-    return 0
-
-
-def _rounds(block: ByteArray, here: int, *, stride: int, lengths: list[int]) -> int:
-    """How many more rounds of the last records follow from `here`: every header byte is compared."""
-    available = min((block.size - here) // stride, _MOST_RECORDS // len(lengths))
-    starts = np.cumsum([0, *(HEADER.size + length for length in lengths[:-1])])
-    found, step = 0, 16
-    while found < available:
-        count = min(step, available - found)
-        first = here + found * stride
-        rows = block[first : first + count * stride].reshape(count, stride)
-        template = block[here - stride : here]
-        same = np.ones(count, np.bool_)
-        for start in starts:
-            head = slice(start, start + HEADER.size)
-            same &= (rows[:, head] == template[head]).all(axis=1)
-        if not same.all():
-            return found + int(np.argmin(same))
-        found += count
-        step *= 8
-    return found
 
 
 def messages(block: ByteArray, tiling: Tiling) -> Messages:
@@ -206,15 +181,12 @@ def messages(block: ByteArray, tiling: Tiling) -> Messages:
 
 
 def gather(block: ByteArray, begin: NDArray[np.int64], size: int) -> ByteArray:
-    """Rows (n, size) of `size` bytes from each of the offsets `begin` (n,)."""
+    """Rows (n, size) of `size` bytes from each of the offsets `begin` (n,); a view where these are even."""
+    if not begin.size:
+        return np.empty((0, size), np.uint8)
+    windows = sliding_window_view(block, size)
     if begin.size > 1:
         stride = int(begin[1] - begin[0])
-        if (
-            stride >= size
-            and np.all(np.diff(begin) == stride)
-            and begin[0] + stride * begin.size <= block.size
-        ):
-            rows = block[begin[0] : begin[0] + stride * begin.size].reshape(begin.size, stride)[:, :size]
-            return np.ascontiguousarray(rows)
-    scattered: ByteArray = block[begin[:, None] + np.arange(size)]
-    return scattered
+        if stride > 0 and np.all(np.diff(begin) == stride):
+            return windows[int(begin[0]) : int(begin[-1]) + 1 : stride]
+    return windows[begin]

@@ -28,6 +28,7 @@ from data.mcap.records import HEADER, ByteArray, Damage, Messages, Tiling, look,
 from data.mcap.resync import chunk_extent, next_chunk, summary_declarations
 
 _LOOSE: Final = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL), int(Opcode.MESSAGE)})
+_LARGE: Final = 4 << 20  # [bytes]
 _MOST_LOSSES: Final = 1000  # after which the rest of a file is given up
 _READERS: Final[dict[int, Callable[[ReadDataStream], Any]]] = {
     Opcode.HEADER: Header.read,
@@ -71,6 +72,7 @@ class McapWalk:
         self.header = Header(profile="", library="")
         self.compressions: dict[str, int] = {}  # chunks by compression, "none" included
         self.indexed = False  # whether a summary stands at the end
+        self.large = content.size > _LARGE  # worth compiled code
         self._content = content
         self._statistics: Statistics | None = None
         self._losses: list[Loss] = []
@@ -129,7 +131,7 @@ class McapWalk:
         begin = here + HEADER.size
         end = begin + length
         if opcode in _LOOSE:
-            tiling = tile(self._content, begin=here, within=_LOOSE)
+            tiling = tile(self._content, begin=here, within=_LOOSE, large=self.large)
             try:
                 block = self._block(self._content, tiling, where=here)
             except Damage as damage:
@@ -152,7 +154,7 @@ class McapWalk:
         content = unpack(chunk, where=begin, unpacked_before=self._unpacked, file_size=self._content.size)
         self._unpacked += chunk.uncompressed_size
         try:
-            found = self._block(content.block, tile(content.block), where=begin)
+            found = self._block(content.block, tile(content.block, large=self.large), where=begin)
         except Damage as damage:
             raise Damage(begin, f"inside a chunk, {damage.why}", resume=end) from damage
         self._chunks += 1

@@ -110,7 +110,7 @@ def test_nested_fields_of_any_message() -> None:
     read = read_columns(np.frombuffer(content, np.uint8), wanted)
     assert [read.topics["/s"].values[p.text][2] for p in wanted] == [2.5, -2.0, 65535.0]
     assert read.topics["/s"].header_time is None
-    assert read.decoded_singly == 3
+    assert read.decoded_singly == 0
     for path, why in (
         ("/s:motor", "group of fields"),
         ("/s:label", "text, not a number"),
@@ -164,11 +164,21 @@ def test_the_field_that_is_the_clock_is_kept_as_it_is_written(texts: list[str]) 
 def test_unread_encodings_and_broken_messages_are_refused_by_name(capfd: pytest.CaptureFixture[str]) -> None:
     cases = [
         (
+            hostile.schema(1, "S", "flatbuffer", b"") + hostile.channel(1, 1, "/a", "flatbuffer"),
+            b"",
+            "'flatbuffer'",
+        ),
+        (
             hostile.schema(1, "S", "protobuf", b"") + hostile.channel(1, 1, "/a", "protobuf"),
             b"",
-            "'protobuf'",
+            "protobuf schema of S cannot be read",
         ),
-        (hostile.schema(1, "S", "ros1msg", b"") + hostile.channel(1, 1, "/a", "ros1"), b"", "'ros1'"),
+        (
+            hostile.schema(1, "p/S", "ros1msg", b"what") + hostile.channel(1, 1, "/a", "ros1"),
+            b"",
+            "is no field",
+        ),
+        (hostile.schema(1, "S", "ros2idl", b"") + hostile.channel(1, 1, "/a", "cdr"), b"", "'ros2idl'"),
         (hostile.channel(1, 0, "/a", "cdr"), b"", "no schema"),
         (
             hostile.schema(1, "p/msg/S", "ros2msg", b"what") + hostile.channel(1, 1, "/a", "cdr"),

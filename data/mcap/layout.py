@@ -1,0 +1,143 @@
+"""Messages of one shape: bytes that never change, and where the numbers stand.
+
+Binary messages can be read as an array where every one of them is proved to have the same shape. A `Layout`
+is that shape, as one message showed it: the bits that must be the same in all (lengths, counts, tags, text),
+and for each number its place. `prove` compares those bits message by message; a size proves nothing, since
+two texts of different length can give messages of one size. What fits no layout goes through the ordinary
+decoder. How a shape is recognised is a matter of the encoding (`ros_layout`, `protobuf_layout`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from data.mcap.field_path import FieldPath
+from data.mcap.records import ByteArray, gather
+from data.mcap.stamp import LATEST, NANOSECONDS, NO_STAMP, PLACES, SECONDS
+
+FloatArray = NDArray[np.float64]
+Fixed = Literal["f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"]  # little-endian
+Variable = Literal["int32", "uint32", "sint32", "int64", "uint64", "sint64"]  # seven bits a byte, as protobuf
+Kind = Fixed | Variable
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """Numbers of one kind, one behind the other."""
+
+    offset: int  # [bytes]
+    kind: Kind
+    width: int  # [bytes] of one
+    count: int | None = None  # elements of an array; None: a number by itself
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A shape: bits to compare, and places of numbers and texts by their path without the last index."""
+
+    template: ByteArray  # (size,)
+    mask: ByteArray  # (size,) ones where a bit is the same in all
+    leaves: Mapping[str, Leaf]
+    texts: Mapping[str, tuple[str, ...]]  # arrays of text
+    zero: frozenset[str] = frozenset()  # numbers that the encoding leaves out where they are 0
+
+    @property
+    def size(self) -> int:
+        """Bytes in a message."""
+        return self.template.size
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where one number stands in every message of a layout; no width: it is 0 in all."""
+
+    offset: int
+    kind: Kind
+    width: int
+
+
+def place(layout: Layout, path: FieldPath) -> Place | None:
+    """Where a path leads; None where it leads to no number, which the ordinary decoder will say."""
+    key = ""
+    for number, step in enumerate(path.steps):
+        index = step.index
+        if step.joint is not None:
+            names = layout.texts.get(f"{key}name", ())
+            if step.joint not in names:
+                return None
+            index = names.index(step.joint)
+        here = f"{key}{step.name}"
+        if number == len(path.steps) - 1:
+            return _element(layout, here, index)
+        key = f"{here}." if index is None else f"{here}[{index}]."
+    return None
+
+
+def _element(layout: Layout, key: str, index: int | None) -> Place | None:
+    if key in layout.zero and index is None:
+        return Place(0, "u1", 0)
+    leaf = layout.leaves.get(key)
+    if leaf is None or (leaf.count is None and index is not None):
+        return None
+    if leaf.count is not None and ((index is None and leaf.count != 1) or (index or 0) >= leaf.count):
+        return None
+    return Place(leaf.offset + leaf.width * (index or 0), leaf.kind, leaf.width)
+
+
+def prove(layout: Layout, block: ByteArray, begin: NDArray[np.int64], *, large: bool) -> NDArray[np.bool_]:
+    """For each message of the layout's size at `begin` (n,), whether its bits are the layout's: (n,)."""
+    if large:
+        from data.mcap.scan import prove as compiled  # noqa: PLC0415  # see `records.tile`
+
+        same = np.empty(begin.size, np.bool_)
+        compiled(block, begin, layout.template, layout.mask, same)
+        return same
+    rows = gather(block, begin, layout.size)
+    return np.asarray(~np.any((rows ^ layout.template) & layout.mask, axis=1))
+
+
+def numbers(block: ByteArray, begin: NDArray[np.int64], where: Place) -> FloatArray:
+    """The numbers (n,) at a place of the messages at `begin` (n,), as the ordinary decoder gives them."""
+    return _integers(block, begin, where).astype(np.float64)
+
+
+def stamps(layout: Layout, block: ByteArray, begin: NDArray[np.int64]) -> NDArray[np.int64] | None:
+    """Stamps (n,) [ns] of the messages at `begin` (n,), `NO_STAMP` where they are none; None without any."""
+    for where in PLACES:
+        prefix = ".".join(where)
+        seconds, rest = (
+            next((own for name in names if (own := _element(layout, f"{prefix}.{name}", None))), None)
+            for names in (SECONDS, NANOSECONDS)
+        )
+        if seconds is None or rest is None or "f" in seconds.kind + rest.kind:
+            if any(key.startswith(f"{prefix}.") for key in (*layout.leaves, *layout.zero)):
+                return None
+            continue
+        whole, part = (_integers(block, begin, own).astype(np.int64) for own in (seconds, rest))
+        sane = (np.abs(whole) <= LATEST) & (np.abs(part) <= LATEST)
+        return np.where(sane, np.where(sane, whole, 0) * 1_000_000_000 + part, NO_STAMP)
+    return None
+
+
+def _integers(block: ByteArray, begin: NDArray[np.int64], where: Place) -> NDArray[Any]:
+    """Numbers (n,) as they are stored."""
+    if not where.width:
+        return np.zeros(begin.size, np.int64)
+    rows = np.ascontiguousarray(gather(block, begin + where.offset, where.width))
+    if where.kind in get_args(Fixed):
+        return rows.view(f"<{where.kind}").reshape(-1)
+    value = np.zeros(begin.size, np.uint64)
+    for k in range(where.width):
+        value |= (rows[:, k].astype(np.uint64) & np.uint64(0x7F)) << np.uint64(7 * k)
+    if where.kind.endswith("32"):  # longer ones are cut, as protobuf does
+        value &= np.uint64(0xFFFFFFFF)
+    if where.kind.startswith("sint"):
+        return (value >> np.uint64(1)).view(np.int64) ^ -(value & np.uint64(1)).view(np.int64)
+    if where.kind == "int32":
+        return value.astype(np.uint32).view(np.int32)
+    return value.view(np.int64) if where.kind == "int64" else value
