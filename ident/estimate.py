@@ -105,6 +105,12 @@ class IdentifiedRobot:
             return None
         return OneLinkRobot(self.inertia.value, StribeckFriction(positive=positive, negative=negative))
 
+    def curves(self) -> dict[int, StribeckCurve]:
+        """The law of each direction (+1, -1) as far as it is known: F_c + b v without its Stribeck part."""
+        laws = list(self.laws().values())
+        known = {1: _curve(laws[0]) or _line(laws[0]), -1: _curve(laws[-1]) or _line(laws[-1])}
+        return {sign: curve for sign, curve in known.items() if curve is not None}
+
     def draws(self, n: int, generator: np.random.Generator) -> tuple[OneLinkRobot, ...]:
         """Robots drawn from the joint normal of the estimate; those that break a rule of the law are redrawn.
 
@@ -126,6 +132,11 @@ class IdentifiedRobot:
             if candidate is not None:
                 robots.append(candidate)
         return tuple(robots)
+
+
+def _line(estimates: Mapping[str, Estimate]) -> StribeckCurve | None:
+    coulomb, damping = (estimates[name].value for name in ("coulomb_torque", "viscous_damping"))
+    return None if coulomb is None or damping is None else StribeckCurve(coulomb, coulomb, 1.0, damping, 1.0)
 
 
 def _curve(estimates: Mapping[str, Estimate]) -> StribeckCurve | None:

@@ -76,7 +76,7 @@ def write_identification(
         weighted = found.weighted
         advice = advise_without_map() if weighted is None else advise(found.evidence, weighted)
         write_advice(folder, advice, units)
-    figure = figure2(found.friction_map, robot.robot(), axis=axis, simulated=robot.simulated)
+    figure = figure2(found.friction_map, robot.curves(), axis=axis, simulated=robot.simulated)
     folder.write_text("figure2.svg", svg_text(figure))
     if found.validation is not None and found.validation.held_out.points:
         held_out = document["validation"]["held_out"]

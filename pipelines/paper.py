@@ -125,7 +125,8 @@ def write_figure2(folder: ResultFolder) -> None:
     )
     rows = np.column_stack((velocity, low + viscous, high + viscous))
     folder.write_csv("figure2.csv", ("v", "torque_low", "torque_high"), rows.tolist())
-    folder.write_text("figure2.svg", svg_text(figure2((), robot, title="Friction model of Table 1")))
+    curves = {1: robot.friction.positive, -1: robot.friction.negative}
+    folder.write_text("figure2.svg", svg_text(figure2((), curves, title="Friction model of Table 1")))
 
 
 def write_figures4_and_8(folder: ResultFolder) -> None:

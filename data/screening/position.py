@@ -11,6 +11,8 @@ import numpy as np
 from data.findings import Finding, LogError
 from data.screening.run import FloatArray, Run, warning
 
+LONG: Final = 1.5  # sample periods, from which on a step is one over lost samples
+_BESIDE: Final = 20  # steps on either side whose speed it may have had
 _SPIKE_WINDOW: Final = 25  # samples on either side for the local spread
 
 
@@ -19,16 +21,17 @@ def unwrap(run: Run, resolution: float | None) -> tuple[Run, tuple[Finding, ...]
     steps = np.diff(run.position)
     typical = float(np.median(np.abs(steps)))
     largest = float(np.max(np.abs(steps)))
+    moved = _moved(run, steps)
     for modulus in _moduli(resolution, largest):
-        sizes = np.abs(steps)
+        sizes = np.abs(steps - moved)
         alone = np.maximum(np.roll(sizes, 1), np.roll(sizes, -1)) < 0.5 * modulus  # or it is a fast motion
         jumps = np.flatnonzero((np.abs(sizes - modulus) < 0.02 * modulus) & alone)
         if not jumps.size or typical > 0.05 * modulus or jumps.size > 0.02 * steps.size + 4:
             continue
         mended = steps.copy()
-        mended[jumps] -= np.sign(steps[jumps]) * modulus
+        mended[jumps] -= np.sign((steps - moved)[jumps]) * modulus
         around = np.abs(np.stack((np.roll(mended, 1), np.roll(mended, -1))))
-        fits = np.abs(mended) <= 3.0 * around.max(axis=0) + 4.0 * (resolution or 0.0) + 1e-9 * modulus
+        fits = np.abs(mended - moved) <= 3.0 * around.max(axis=0) + 4.0 * (resolution or 0.0) + 1e-9 * modulus
         if not np.all(fits[jumps]):
             k = int(jumps[~fits[jumps]][0])
             raise LogError(
@@ -44,6 +47,18 @@ def unwrap(run: Run, resolution: float | None) -> tuple[Run, tuple[Finding, ...]
         )
         return replace(run, position=position), (warning("E-WRAP", text, run),)
     return run, ()
+
+
+def _moved(run: Run, steps: FloatArray) -> FloatArray:
+    """How far the link went in each step (n - 1,) that lasts long [rad], at the speed beside it; else 0."""
+    lasted = np.diff(run.time)
+    size, moved = np.abs(steps), np.zeros_like(steps)
+    for k in np.flatnonzero(lasted > LONG * float(np.median(lasted))).tolist():
+        near = np.r_[max(k - _BESIDE, 0) : k, k + 1 : min(k + 1 + _BESIDE, steps.size)]
+        near = near[size[near] <= 3.0 * float(np.median(size[near]))] if near.size else near  # no wrap there
+        gone = float(np.sum(lasted[near]))
+        moved[k] = float(np.sum(steps[near])) / gone * lasted[k] if gone > 0.0 else 0.0
+    return moved
 
 
 def _moduli(resolution: float | None, largest: float) -> list[float]:

@@ -32,8 +32,9 @@ def saturation(run: Run, limit: float | None, *, declared: bool) -> tuple[Findin
     k = int(np.argmax(at_limit))
     text = (
         f"the torque is {what} in {np.count_nonzero(at_limit)} of {size.size} samples, first at "
-        f"t = {run.time[k]:.6g} s; a saturated torque is not the one commanded, and a breakaway there is "
-        "only a lower bound of F_s. Those samples are not to be used"
+        f"t = {run.time[k]:.6g} s; a saturated torque is not the one commanded"
+        + (", and a breakaway there is only a lower bound of F_s" if run.protocol == "breakaway" else "")
+        + ". Those samples are not to be used"
     )
     return (warning("E-SAT", text, run),)
 

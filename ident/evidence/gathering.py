@@ -128,7 +128,7 @@ def run_uses(recordings: Sequence[Recording], evidence: Evidence) -> tuple[RunUs
     """Every log once: whether it was used, and if not, or only what was salvaged of it, why."""
     used = {run.log for run in evidence.used_runs} | {start.log for start in evidence.used_starts}
     reasons: dict[str, list[str]] = {}
-    for log, why, _ in _left_out(evidence):
+    for log, why, _ in _once(_left_out(evidence)):
         reasons.setdefault(log, []).append(why)
     if evidence.response is not None:
         used |= {fit.log for fit in evidence.response.fits}
@@ -158,7 +158,7 @@ def log_findings(recordings: Sequence[Recording]) -> list[Finding]:
 def run_findings(evidence: Evidence) -> tuple[Finding, ...]:
     """A finding for each run or start that is left out under a code."""
     found = []
-    for log, why, where in _left_out(evidence):
+    for log, why, where in _once(_left_out(evidence)):
         code, colon, text = why.partition(": ")
         if not colon or not code.startswith("E-"):
             continue
@@ -178,6 +178,21 @@ def _left_out(evidence: Evidence) -> list[tuple[str, str, float]]:
     return runs + starts
 
 
+def _once(left_out: Sequence[tuple[str, str, float]]) -> list[tuple[str, str, float]]:
+    """Each code of a log once, with the number of times; reasons without a code once each."""
+    alike: dict[tuple[str, str], list[tuple[str, str, float]]] = {}
+    for log, why, where in left_out:
+        code, colon, _ = why.partition(": ")
+        alike.setdefault((log, code if colon and code.startswith("E-") else why), []).append(
+            (log, why, where)
+        )
+    return [
+        (log, f"{why} So {len(own)} times in this log." if len(own) > 1 else why, where)
+        for own in alike.values()
+        for log, why, where in own[:1]
+    ]
+
+
 def _of(recordings: Iterable[Recording], protocol: ProtocolName) -> list[Recording]:
     return [recording for recording in recordings if recording.protocol == protocol]
 
@@ -187,8 +202,10 @@ def _require_a_direction(recordings: Sequence[Recording], evidence: Evidence) ->
         return
     seen = sorted({recording.protocol for recording in recordings})
     logs = sum(recording.protocol == "constant_velocity" for recording in recordings)
-    left_out = [run for run in evidence.runs if run.why is not None]
-    also = f" {len(left_out)} run(s) were left out; the first: {left_out[0].why}" if left_out else ""
+    reasons = {why.partition(": ")[0]: why for _, why, _ in _left_out(evidence)}
+    bounds = [abs(start.torque) for start in evidence.starts if start.is_censored]
+    also = f" What was left out: {'; '.join(reasons.values())}" if reasons else ""
+    also += f" All that is known: F_s >= {max(bounds):.4g}." if bounds else ""
     raise IdentificationError(
         f"E-DIRECTION: no usable constant-velocity run in either direction ({logs} constant_velocity log(s); "
         f"protocols seen: {', '.join(seen) or 'none'}).{also} Record constant speeds with positive and with "

@@ -13,7 +13,8 @@ friction that follows its change of speed,
 with one wavenumber k [rad^-1, or m^-1] a wave for all runs and A, B of each direction d: a torque ripple is
 the same both ways, a friction ripple flips. Both directions are pooled where they agree. k is searched for
 on a continuous grid and beyond its ends, strongest wave first, and taken as whole where the positions are
-angles and a whole one explains as much (gravity: one in a turn); a wave has to stand far out of the
+angles and a whole one explains as much (gravity: one in a turn); a wave has to be long against an
+encoder's count (the torque of a speed loop follows the counts themselves), has to stand far out of the
 neighbouring wavenumbers, and the runs have to agree on its phase, or positions are not absolute from log to
 log. A wave on whose phase they do not agree cannot be taken out: its size then is an error of each run and
 each breakaway.
@@ -22,7 +23,7 @@ each breakaway.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +40,7 @@ REFINEMENTS = 4  # quarterings of the grid's step
 MOST_LOOKS = 30  # for the top of a wave's power
 AS_MUCH = 0.995  # of a wave's power, that a whole wavenumber has to explain
 OWN_WAVES = 1.0  # in a run that is asked for a phase of its own
+FEWEST_COUNTS = 24.0  # of the encoder in a wave: the answer of a speed loop to single counts is no friction
 FINEST = 1.2  # largest phase that a block may cover
 NEIGHBOURS = 150  # wavenumbers on each side of a wave whose power is the background
 STANDS_OUT = 50.0  # power of a wave over the background, where 4 are expected of noise
@@ -135,9 +137,11 @@ def _noise(traces: Sequence[Trace]) -> list[float]:
 def _grid(traces: Sequence[Trace]) -> FloatArray:
     longest = max(own.travel for own in traces)
     finest = sorted(own.stride for own in traces)[len(traces) // 4]
+    coarsest = max(own.grain for own in traces)
     step = 2 * np.pi * STEP / longest
     first = 2 * np.pi * LEAST_WAVES / longest
-    count = int(min(GRID, max((FINEST / finest - first) / step, 2)))
+    last = min(FINEST / finest, 2 * np.pi / (FEWEST_COUNTS * coarsest) if coarsest else np.inf)
+    count = int(min(GRID, max((last - first) / step, 2)))
     return np.asarray(first + step * np.arange(count))
 
 
@@ -240,7 +244,7 @@ def _without(traces: Sequence[Trace], found: Sequence[float], noise: Sequence[fl
     for own in traces:
         waves = own.waves(np.array(found)).transpose(0, 2, 1).reshape(own.torque.size, -1)
         torque = own.torque - waves @ solved[own.direction]
-        left.append(Trace(own.direction, own.position, torque, own.smooth, own.stride))
+        left.append(replace(own, torque=torque))
     return left
 
 
@@ -329,7 +333,7 @@ def _incoherent(
             torque = torque - run.waves(at)[:, :, 0] @ both
             squares.append(float(both @ both))
             whole.append(run)
-        after.append(Trace(run.direction, run.position, torque, run.smooth, run.stride))
+        after.append(replace(run, torque=torque))
     quiet = _noise(after)
     background = float(_background(_power(after, grid, quiet)[1])[peak])
     heard = [

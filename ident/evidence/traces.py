@@ -9,6 +9,7 @@ import numpy as np
 
 from data.recording import FloatArray, Recording
 from ident.evidence.friction_map import SteadyRun
+from ident.evidence.segmentation import grain
 
 BLOCKS = 300  # a run, at most
 LEAST_BLOCKS = 24
@@ -24,6 +25,7 @@ class Trace:
     torque: FloatArray  # (m,) [N m]
     smooth: FloatArray  # (m, 2) orthonormal: what mean and trend span [-]
     stride: float  # travel of a block [rad]
+    grain: float = 0.0  # what the position cannot resolve [rad]
 
     @property
     def travel(self) -> float:
@@ -90,4 +92,6 @@ def trace(recording: Recording, run: SteadyRun, *, inertia: float | None, slope:
         driven = driven - smooth @ (smooth.T @ driven)
         # An acceleration that is mostly rounding would only hide what is there.
         torque = driven if np.var(driven) < 1.5 * np.var(torque) else torque
-    return Trace(run.direction, position[1:-1], torque, np.asarray(smooth), run.travel / blocks)
+    return Trace(
+        run.direction, position[1:-1], torque, np.asarray(smooth), run.travel / blocks, grain(recording)
+    )

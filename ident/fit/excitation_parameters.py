@@ -217,8 +217,9 @@ def _law_findings(found: ExcitedLaw) -> list[Finding]:
     if found.linear.relative_error > POOR and found.whole is None:
         text = (
             f"the law leaves {100 * found.linear.relative_error:.0f} % of the torque unexplained: intervals "
-            "are conditional on the law. Look for a flexible joint, a changing load, or friction that goes "
-            "with position or temperature."
+            "are conditional on the law. Try --per-direction where friction may differ between the "
+            "directions, and look for a flexible joint, a changing load, or friction that goes with position "
+            "or temperature."
         )
         findings.append(Finding("E-LACKOFFIT", Severity.WARN, text))
     return findings

@@ -37,8 +37,8 @@ from ident.fit.weighting import Weighted, settle, with_inertia
 from ident.fit.withholding import require_enough
 
 _CAUSE = (
-    "a flexible link or friction that varies with place would do it. The frequency response is the one "
-    "reported."
+    "a torque that acts later than it is logged, a flexible link or friction that varies with place would do "
+    "it. The frequency response is the one reported."
 )
 
 

@@ -10,7 +10,7 @@ it was measured.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -20,7 +20,6 @@ from matplotlib.lines import Line2D
 
 from ident.evidence.friction_map import MapPoint
 from ident.model.friction import StribeckCurve
-from ident.model.robot import OneLinkRobot
 from pipelines.report.axis_units import units_of
 from pipelines.report.speed_axis import speed_axis
 from pipelines.report.style import DIRECTION_COLOUR, DIRECTION_NAME, INK, key, new_figure, styled, zero_lines
@@ -34,56 +33,54 @@ _MEASURED: Final = "_"
 @styled
 def figure2(
     points: Sequence[MapPoint],
-    robot: OneLinkRobot | None,
+    curves: Mapping[int, StribeckCurve],
     *,
     title: str = "Friction measurements and friction model",
     axis: str = "rotary",
     simulated: bool = False,
 ) -> Figure:
-    """Measurements as dots with 95 % bars, runs left out as hollow marks, `robot`'s friction as a solid line.
-
-    Without a robot (a parameter was withheld) the measurements stand alone.
+    """Measurements as dots with 95 % bars, runs left out as hollow marks, the friction of each direction that
+    is known (+1, -1) as a solid line.
     """
     drawn = [point for point in points if math.isfinite(point.velocity) and math.isfinite(point.torque)]
     figure = new_figure(title, height=3.9, simulated=simulated)
     whole, slow = figure.subplots(1, 2, width_ratios=(1.0, 1.1))
     units = units_of(axis)
-    _draw_whole(whole, drawn, robot)
+    _draw_whole(whole, drawn, curves)
     whole.set(xlabel=f"velocity [{units.velocity}]", ylabel=f"friction {units.effort} [{units.torque}]")
     whole.set_title("both directions")
-    _draw_slow(slow, drawn, robot)
+    _draw_slow(slow, drawn, curves)
     slow.set(xlabel=f"speed [{units.velocity}], logarithmic", ylabel=f"magnitude [{units.torque}]")
     slow.set_title("the Stribeck part")
-    handles = _legend(drawn, robot)
+    handles = _legend(drawn, curves)
     figure.legend(handles=handles, loc="outside lower center", ncols=5, columnspacing=1.3)
     return figure
 
 
-def _draw_whole(axes: Axes, points: Sequence[MapPoint], robot: OneLinkRobot | None) -> None:
+def _draw_whole(axes: Axes, points: Sequence[MapPoint], curves: Mapping[int, StribeckCurve]) -> None:
     zero_lines(axes)
     fastest = max((abs(point.velocity) for point in points), default=_WITHOUT_POINTS)
-    if robot is not None:
-        speed = np.geomspace(1e-4, 1.0, 400) * fastest * 1.03
-        for sign, curve in _curves(robot):
-            axes.plot(sign * speed, sign * curve.total(speed), color=DIRECTION_COLOUR[sign], zorder=3)
-        rest = (-robot.friction.negative.static_torque, robot.friction.positive.static_torque)
+    speed = np.geomspace(1e-4, 1.0, 400) * fastest * 1.03
+    for sign, curve in curves.items():
+        axes.plot(sign * speed, sign * curve.total(speed), color=DIRECTION_COLOUR[sign], zorder=3)
+    if len(curves) == 2:
+        rest = [sign * curve.static_torque for sign, curve in curves.items()]
         axes.plot((0.0, 0.0), rest, color=INK, linewidth=1.6, zorder=2.8)
     for point in points:
         _mark(axes, point, velocity=point.velocity, side=1)
 
 
-def _draw_slow(axes: Axes, points: Sequence[MapPoint], robot: OneLinkRobot | None) -> None:
+def _draw_slow(axes: Axes, points: Sequence[MapPoint], curves: Mapping[int, StribeckCurve]) -> None:
     moving = sorted(abs(point.velocity) for point in points if abs(point.velocity) > 0)
     slowest = moving[0] if moving else 0.01
     fastest = moving[-1] if moving else 1.0
-    if robot is not None:
-        velocities = [curve.stribeck_velocity for _, curve in _curves(robot)]
+    if curves:
+        velocities = [curve.stribeck_velocity for curve in curves.values()]
         fastest = max(min(fastest, _STRIBECK_RANGE * max(velocities)), 2.0 * slowest)
     floor = speed_axis(axes, slowest=slowest, fastest=fastest)
-    if robot is not None:
-        speed = np.concatenate(([0.0], np.geomspace(1e-2 * floor, 1.15 * fastest, 400)))
-        for direction, curve in _curves(robot):
-            axes.plot(speed, curve.total(speed), color=DIRECTION_COLOUR[direction], zorder=3)
+    speed = np.concatenate(([0.0], np.geomspace(1e-2 * floor, 1.15 * fastest, 400)))
+    for direction, curve in curves.items():
+        axes.plot(speed, curve.total(speed), color=DIRECTION_COLOUR[direction], zorder=3)
     for point in points:
         if abs(point.velocity) <= 1.15 * fastest:
             _mark(axes, point, velocity=abs(point.velocity), side=point.direction)
@@ -115,16 +112,13 @@ def _is_shifted(point: MapPoint) -> bool:
     return point.fitted is not None and abs(point.fitted - point.torque) > 0.5 * (point.stderr or 0.0)
 
 
-def _curves(robot: OneLinkRobot) -> tuple[tuple[int, StribeckCurve], tuple[int, StribeckCurve]]:
-    return (1, robot.friction.positive), (-1, robot.friction.negative)
-
-
-def _legend(points: Sequence[MapPoint], robot: OneLinkRobot | None) -> list[Line2D]:
-    line = 1.6 if robot is not None else 0.0
-    handles = [
-        key(DIRECTION_NAME[sign], marker="o" if points else "", colour=DIRECTION_COLOUR[sign], line=line)
-        for sign in (1, -1)
-    ]
+def _legend(points: Sequence[MapPoint], curves: Mapping[int, StribeckCurve]) -> list[Line2D]:
+    handles = []
+    for sign in (1, -1):
+        marker = "o" if any(point.direction == sign for point in points) else ""
+        line = 1.6 if sign in curves else 0.0
+        if marker or line:
+            handles.append(key(DIRECTION_NAME[sign], marker=marker, colour=DIRECTION_COLOUR[sign], line=line))
     protocols = {point.protocol for point in points}
     if "constant_velocity" in protocols:
         handles.append(key("constant velocity, with 95 % bar", marker="o"))

@@ -43,3 +43,10 @@ def test_draws_of_one_law_keep_both_directions_alike() -> None:
 def test_a_withheld_parameter_of_the_one_law_leaves_no_robot() -> None:
     assert one_law(static_torque=None).robot() is None
     assert one_law(static_torque=None).one_law
+
+
+def test_a_law_is_drawn_as_far_as_it_is_known() -> None:
+    assert one_law().curves()[1].static_torque == 0.5
+    line = one_law(static_torque=None, stribeck_velocity=None).curves()
+    assert {curve.total(np.array([2.0]))[0] for curve in line.values()} == {0.4 + 2.0 * 0.08}
+    assert one_law(viscous_damping=None).curves() == {}

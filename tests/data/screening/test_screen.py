@@ -107,6 +107,21 @@ def test_a_wrap_is_undone_exactly(modulus: float) -> None:
     assert np.allclose(got.signals.position, run.position, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("wrapped", [False, True])
+def test_a_way_over_lost_samples_is_no_wrap_of_as_many_counts(wrapped: bool) -> None:
+    count, modulus = 2 * np.pi / 20_000, 512 * 2 * np.pi / 20_000
+    time = np.arange(4000, dtype=np.float64) * 1e-3
+    position = np.rint(time / count) * count
+    keep = (time < 1.5) | (time >= 1.5 + modulus)  # at 1 rad/s, 512 counts of way are lost
+    run = replace(
+        motion(), time=time[keep], position=position[keep], torque=np.full(keep.sum(), 0.5), velocity=None
+    )
+    logged = replace(run, position=(run.position + 0.01) % modulus) if wrapped else run
+    got = screened(logged, resolution=count)
+    assert [f.code for f in got.findings] == (["E-WRAP", "E-GAP"] if wrapped else ["E-GAP"])
+    assert np.ptp(got.signals.position) == pytest.approx(np.ptp(run.position), abs=1e-9)
+
+
 def test_a_turn_that_does_not_fit_its_surroundings_is_refused() -> None:
     run = motion(amplitude=0.5)
     jump = np.where(run.time > 2.0, 2 * math.pi * 1.01, 0.0)

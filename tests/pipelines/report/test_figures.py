@@ -8,7 +8,9 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 from compensation.bifurcation import Branch, Point
+from ident.model.friction import StribeckCurve
 from ident.model.published import asymmetric_robot, symmetric_robot
+from ident.model.robot import OneLinkRobot
 from pipelines.report.bifurcation_figures import branch_arrays, figure9
 from pipelines.report.comparison_figure import figure10
 from pipelines.report.equilibrium_figures import figure4, figure8
@@ -28,10 +30,14 @@ def _labels(text: str) -> list[str]:
     return re.findall(r"<!-- (.*?) -->", text)
 
 
+def _curves(robot: OneLinkRobot) -> dict[int, StribeckCurve]:
+    return {1: robot.friction.positive, -1: robot.friction.negative}
+
+
 class TestFigure2:
     def test_holds_every_measurement_in_both_panels(self) -> None:
         points = examples.map_points()
-        whole, slow = figure2(points, asymmetric_robot()).axes
+        whole, slow = figure2(points, _curves(asymmetric_robot())).axes
         for marker, protocol in (("o", "constant_velocity"), ("D", "breakaway")):
             wanted = [(p.velocity, p.torque) for p in points if p.protocol == protocol]
             drawn = [tuple(np.ravel(mark.get_xydata())) for mark in _marks(whole, marker)]
@@ -40,7 +46,7 @@ class TestFigure2:
         assert len(_marks(slow, "o")) == 4  # 1.5 rad/s lies beyond the Stribeck part
 
     def test_a_run_left_out_is_hollow(self) -> None:
-        whole = figure2(examples.map_points(), None).axes[0]
+        whole = figure2(examples.map_points(), {}).axes[0]
         hollow = [mark for mark in _marks(whole, "o") if mark.get_markerfacecolor() == "none"]
         assert sorted(float(np.ravel(mark.get_xdata())[0]) for mark in hollow) == [-0.006, 0.006]
 
@@ -48,7 +54,7 @@ class TestFigure2:
         robot = asymmetric_robot()
         lines = [
             line
-            for line in figure2(examples.map_points(), robot).axes[0].lines
+            for line in figure2(examples.map_points(), _curves(robot)).axes[0].lines
             if line.get_marker() == "None"
         ]
         curves = [line for line in lines if len(np.ravel(line.get_xdata())) > 100]
@@ -57,15 +63,22 @@ class TestFigure2:
         rest = next(
             line for line in lines if np.ptp(np.ravel(line.get_ydata())) > 1 and not np.any(line.get_xdata())
         )
-        assert tuple(np.ravel(rest.get_ydata())) == (-0.5123, 0.5735)
+        assert sorted(np.ravel(rest.get_ydata())) == [-0.5123, 0.5735]
+
+    def test_a_direction_that_is_known_alone_is_drawn_alone(self) -> None:
+        curve = asymmetric_robot().friction.negative
+        lines = [
+            line for line in figure2([], {-1: curve}).axes[0].lines if len(np.ravel(line.get_xdata())) > 9
+        ]
+        assert [float(np.max(np.ravel(line.get_xdata()))) < 0 for line in lines] == [True]
 
     def test_draws_what_there_is(self) -> None:
-        assert len(figure2([], None).axes) == 2
-        assert len(figure2([], symmetric_robot()).axes) == 2
-        assert len(figure2(examples.map_points()[:1], None).axes) == 2
+        assert len(figure2([], {}).axes) == 2
+        assert len(figure2([], _curves(symmetric_robot())).axes) == 2
+        assert len(figure2(examples.map_points()[:1], {}).axes) == 2
 
     def test_units_follow_the_axis(self) -> None:
-        labels = " ".join(_labels(svg_text(figure2([], None, axis="linear"))))
+        labels = " ".join(_labels(svg_text(figure2([], {}, axis="linear"))))
         assert "velocity [m/s]" in labels
         assert "force [N]" in labels
 

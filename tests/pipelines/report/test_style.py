@@ -16,6 +16,8 @@ from pipelines.report.style import COLOURS, plain, svg_text
 from pipelines.report.time_figures import figure6, figure7
 from tests.pipelines.report import examples
 
+_FRICTION = asymmetric_robot().friction
+CURVES = {1: _FRICTION.positive, -1: _FRICTION.negative}
 _GAIN = np.linspace(20.0, 120.0, 11)
 _EDGES = np.column_stack((np.linspace(-0.4, 0.0, 11), np.linspace(0.4, 0.0, 11)))
 _SVG = "{http://www.w3.org/2000/svg}"
@@ -24,7 +26,7 @@ _SVG = "{http://www.w3.org/2000/svg}"
 def _figure(number: int, *, title: str = "a title", simulated: bool = False) -> Figure:
     motion = examples.motion()
     if number == 2:
-        return figure2(examples.map_points(), asymmetric_robot(), title=title, simulated=simulated)
+        return figure2(examples.map_points(), CURVES, title=title, simulated=simulated)
     if number == 4:
         return figure4(_GAIN, _EDGES, 3 * _EDGES, critical_gain=73.07, title=title, simulated=simulated)
     if number == 6:
