@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from mcap.records import Channel
@@ -85,7 +85,7 @@ def read_columns(
         paths.setdefault(path.topic, []).append(path)
     readers: dict[int, _ChannelReader] = {}
     for block in walk.blocks():
-        for number in np.unique(block.messages.channel).tolist():
+        for number in np.flatnonzero(np.bincount(block.messages.channel)).tolist():
             channel = walk.channels[number]
             if channel.topic in paths:
                 if number not in readers:
@@ -150,6 +150,8 @@ def _topic(walk: McapWalk, topic: str, readers: Mapping[int, _ChannelReader]) ->
                 "way to tell which is the rig's. Keep one of them in the log"
             )
     parts = [part for _, part in mine]
+    if len(parts) == 1:
+        return parts[0]
     headers = [part.header_time for part in parts if part.header_time is not None]
     return Topic(
         values={name: np.concatenate([part.values[name] for part in parts]) for name in parts[0].values},
@@ -172,8 +174,8 @@ class _ChannelReader:
     large: bool = False  # whether the file is worth compiled code
     singly: int = 0
     layouts: list[tuple[Layout, list[Place]]] = field(default_factory=list)
-    columns: list[FloatArray] = field(default_factory=list)  # (paths, n) a block
-    clocks: list[TimeArray] = field(default_factory=list)  # (3, n) a block: log, publish, header
+    columns: list[list[FloatArray]] = field(default_factory=list)  # of each path, a block each
+    clocks: list[list[TimeArray]] = field(default_factory=lambda: [[], [], []])  # log, publish, header
     ticks: list[Decimal] = field(default_factory=list)
 
     def take(self, block: Block, number: int) -> None:
@@ -199,8 +201,13 @@ class _ChannelReader:
             if self.clock is not None:
                 self.ticks.append(_exact(resolve_exactly(message, self.clock)))
             self.singly += 1
-        self.columns.append(values)
-        self.clocks.append(np.stack((found.log_time[mine], found.publish_time[mine], header)))
+        self.columns = self.columns or [[] for _ in self.paths]
+        for column, row in zip(self.columns, values, strict=True):
+            column.append(row.copy())
+        for clock, own in zip(
+            self.clocks, (found.log_time[mine], found.publish_time[mine], header), strict=True
+        ):
+            clock.append(own)
 
     def _take_layouts(
         self,
@@ -240,16 +247,22 @@ class _ChannelReader:
             left[candidates] = False
 
     def topic(self) -> Topic:
-        """All that was gathered."""
-        values = np.concatenate(self.columns, axis=1)
-        clocks = np.concatenate(self.clocks, axis=1)
+        """All that was gathered; the blocks are let go as they are joined, column by column."""
+        values = {path.text: _joined(column) for path, column in zip(self.paths, self.columns, strict=True)}
+        log_time, publish_time, header = (_joined(clock) for clock in self.clocks)
         return Topic(
-            values={path.text: values[row] for row, path in enumerate(self.paths)},
-            log_time=clocks[0],
-            publish_time=clocks[1],
-            header_time=clocks[2] if np.all(clocks[2] != NO_STAMP) else None,
+            values=values,
+            log_time=log_time,
+            publish_time=publish_time,
+            header_time=header if np.all(header != NO_STAMP) else None,
             ticks=tuple(self.ticks),
         )
+
+
+def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+    whole = np.concatenate(parts)
+    parts.clear()
+    return whole
 
 
 def _exact(value: Number) -> Decimal:

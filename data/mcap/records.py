@@ -20,7 +20,6 @@ import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 ByteArray = NDArray[np.uint8]
@@ -184,9 +183,8 @@ def gather(block: ByteArray, begin: NDArray[np.int64], size: int) -> ByteArray:
     """Rows (n, size) of `size` bytes from each of the offsets `begin` (n,); a view where these are even."""
     if not begin.size:
         return np.empty((0, size), np.uint8)
-    windows = sliding_window_view(block, size)
     if begin.size > 1:
         stride = int(begin[1] - begin[0])
         if stride > 0 and np.all(np.diff(begin) == stride):
-            return windows[int(begin[0]) : int(begin[-1]) + 1 : stride]
-    return windows[begin]
+            return np.ndarray((begin.size, size), np.uint8, block, int(begin[0]), (stride, 1))
+    return np.ndarray((block.size - size + 1, size), np.uint8, block, 0, (1, 1))[begin]
