@@ -1,7 +1,7 @@
 """Columns of numbers out of an MCAP file, straight from its blocks where that can be proved.
 
-Binary messages that share a layout (`layout`) are taken as arrays, JSON ones a block at a time
-(`json_block`); the proof is made for every message, and those that cannot be proved go through the ordinary
+Binary messages that share a layout (`layout`) are taken as arrays, and JSON ones that share a text
+(`json_layout`); the proof is made for every message, and those that cannot be proved go through the ordinary
 decoder one by one. Both ways give the same numbers, bit for bit.
 
 Each topic keeps its three clocks: the log time (when the recorder got a message), the publish time, and the
@@ -31,7 +31,7 @@ from data.mcap.walk import Block, McapWalk
 from data.names import nearest, shown
 
 if TYPE_CHECKING:
-    from data.mcap.json_block import JsonBlock
+    from data.mcap.json_layout import JsonReader
 
 FloatArray = NDArray[np.float64]
 TimeArray = NDArray[np.int64]
@@ -127,10 +127,9 @@ def _reader(
     if clock is not None:
         return _ChannelReader(paths, decode, clock=clock)
     if channel.message_encoding == "json" and walk.large:
-        from data.mcap.json_block import JsonBlock  # noqa: PLC0415  # few logs need it
+        from data.mcap.json_layout import JsonReader  # noqa: PLC0415  # numba takes long to load
 
-        if JsonBlock.can_read(paths):
-            return _ChannelReader(paths, decode, json=JsonBlock(paths))
+        return _ChannelReader(paths, decode, json=JsonReader(paths))
     return _ChannelReader(paths, decode, recognise=recogniser(channel, schema), large=walk.large)
 
 
@@ -169,7 +168,7 @@ class _ChannelReader:
     paths: list[FieldPath]
     decode: Decode
     recognise: Recognise | None = None  # how a layout is found, where one may be proved
-    json: JsonBlock | None = None  # reads a block at once
+    json: JsonReader | None = None  # reads a block at once
     clock: FieldPath | None = None  # which of the paths is the time
     large: bool = False  # whether the file is worth compiled code
     singly: int = 0
@@ -191,8 +190,8 @@ class _ChannelReader:
                 block, self.recognise, begin=begin, length=length, left=left, values=values, header=header
             )
         if self.json is not None:
-            read, numbers_read, stamps_read = self.json.read(block.data, begin, length)
-            values[:, read], header[read], left = numbers_read, stamps_read, ~read
+            read, values, header = self.json.read(block.data, begin, length)
+            left = ~read
         for k in np.flatnonzero(left).tolist():
             raw = block.data[int(begin[k]) : int(begin[k] + length[k])].tobytes()
             message = self.decode(raw)

@@ -108,19 +108,26 @@ def numbers(block: ByteArray, begin: NDArray[np.int64], where: Place) -> FloatAr
 
 def stamps(layout: Layout, block: ByteArray, begin: NDArray[np.int64]) -> NDArray[np.int64] | None:
     """Stamps (n,) [ns] of the messages at `begin` (n,), `NO_STAMP` where they are none; None without any."""
-    for where in PLACES:
-        prefix = ".".join(where)
+    where = stamp_places(layout)
+    if where is None or "f" in where[0].kind + where[1].kind:
+        return None
+    whole, part = (_integers(block, begin, own).astype(np.int64) for own in where)
+    sane = (np.abs(whole) <= LATEST) & (np.abs(part) <= LATEST)
+    return np.where(sane, np.where(sane, whole, 0) * 1_000_000_000 + part, NO_STAMP)
+
+
+def stamp_places(layout: Layout) -> tuple[Place, Place] | None:
+    """Where a message's own seconds and nanoseconds stand; None where it has none."""
+    for way in PLACES:
+        prefix = ".".join(way)
         seconds, rest = (
             next((own for name in names if (own := _element(layout, f"{prefix}.{name}", None))), None)
             for names in (SECONDS, NANOSECONDS)
         )
-        if seconds is None or rest is None or "f" in seconds.kind + rest.kind:
-            if any(key.startswith(f"{prefix}.") for key in (*layout.leaves, *layout.zero)):
-                return None
-            continue
-        whole, part = (_integers(block, begin, own).astype(np.int64) for own in (seconds, rest))
-        sane = (np.abs(whole) <= LATEST) & (np.abs(part) <= LATEST)
-        return np.where(sane, np.where(sane, whole, 0) * 1_000_000_000 + part, NO_STAMP)
+        if seconds is not None and rest is not None:
+            return seconds, rest
+        if any(key.startswith(f"{prefix}.") for key in (*layout.leaves, *layout.zero)):
+            return None
     return None
 
 

@@ -55,30 +55,3 @@ def prove(
         for j in range(template.size):
             differs |= (row[j] ^ template[j]) & mask[j]
         same[k] = differs == 0
-
-
-@kernel
-def as_lines(
-    block: NDArray[np.uint8],
-    begin: NDArray[np.int64],
-    length: NDArray[np.int64],
-    lines: NDArray[np.uint8],
-    single: NDArray[np.bool_],
-) -> None:
-    """Messages (n,) in order, each behind a line's end and blanks; one that holds a line's end is left out.
-
-    `lines` begins one byte before the first message, `single` (n,) says which are there.
-    """
-    low = begin[0] - 1
-    lines[:] = 32
-    for k in range(begin.size):
-        place = begin[k] - low
-        lines[place - 1] = 10
-        broken = False
-        for j in range(length[k]):
-            letter = block[begin[k] + j]
-            lines[place + j] = letter
-            broken |= letter == 10
-        if broken:
-            lines[place : place + length[k]] = 32
-        single[k] = not broken

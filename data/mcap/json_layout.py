@@ -1,0 +1,206 @@
+"""JSON messages of one text but for their numbers: read as arrays, each compared with the text.
+
+One message is parsed to see where its numbers stand. Another is its like if all that lies between the numbers
+is the same, byte by byte, and numbers stand where numbers stood; then its structure is the same too. What is
+no like of any goes to the ordinary decoder: another spacing or text, NaN, a number of more digits than a
+double needs.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from data.mcap.field_path import FieldPath
+from data.mcap.json_scan import POWERS, match
+from data.mcap.layout import Layout, Leaf, place, stamp_places
+from data.mcap.records import ByteArray
+from data.mcap.stamp import LATEST, NO_STAMP
+
+FloatArray = NDArray[np.float64]
+_TOKEN: Final = re.compile(
+    rb'[ \t\n\r]*(?:([\[\]{}:,])|("(?:[^"\\\x00-\x1f]|\\.)*")|(-?\d[-+.\deE]*)|(true|false|null))'
+)
+_DEEPEST: Final = 32
+_MOST_NUMBERS: Final = 4096
+_MOST_LAYOUTS: Final = 16
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """A text: what lies between its numbers, and which of them are wanted."""
+
+    text: ByteArray
+    edges: NDArray[np.int64]  # (k + 2,) of the pieces between k numbers
+    slot: NDArray[np.int64]  # (k,) row that a number goes to, or -1
+    rows: tuple[int, ...]  # of the paths
+    stamp: tuple[int, int] | None  # rows of seconds and nanoseconds
+
+
+class JsonReader:
+    """Reads the numbers at some paths out of blocks of JSON messages."""
+
+    def __init__(self, paths: Sequence[FieldPath]) -> None:
+        self._paths = paths
+        self._shapes: list[_Shape] = []
+
+    def read(
+        self, block: ByteArray, begin: NDArray[np.int64], length: NDArray[np.int64]
+    ) -> tuple[NDArray[np.bool_], FloatArray, NDArray[np.int64]]:
+        """Which messages (n,) could be read, their numbers (paths, n) and stamps (n,) [ns]."""
+        values = np.empty((len(self._paths), begin.size))
+        stamp = np.full(begin.size, NO_STAMP, np.int64)
+        left, tried = np.ones(begin.size, np.bool_), 0
+        while left.any() and tried < _MOST_LAYOUTS:
+            if tried == len(self._shapes):
+                k = int(np.argmax(left))
+                raw = block[int(begin[k]) : int(begin[k] + length[k])].tobytes()
+                shape = _shape_of(raw, self._paths)
+                if shape is None:
+                    break
+                self._shapes.append(shape)
+            own = np.flatnonzero(left)
+            shape = self._shapes[tried]
+            tried += 1
+            numbers, integers, same = _matched(shape, block, begin[own], length[own])
+            own = own[same]
+            values[:, own] = numbers[list(shape.rows)][:, same]
+            if shape.stamp is not None:
+                stamp[own] = _stamps(integers[list(shape.stamp)][:, same])
+            left[own] = False
+        return ~left, values, stamp
+
+
+def _matched(
+    shape: _Shape, block: ByteArray, begin: NDArray[np.int64], length: NDArray[np.int64]
+) -> tuple[FloatArray, NDArray[np.int64], NDArray[np.bool_]]:
+    wanted = int(shape.slot.max(initial=-1)) + 1
+    bits = np.zeros((wanted, begin.size), np.uint64)
+    integers, same = np.zeros((wanted, begin.size), np.int64), np.zeros(begin.size, np.bool_)
+    match(block, begin, length, shape.text, shape.edges, shape.slot, bits, integers, POWERS, same)
+    return bits.view(np.float64), integers, same
+
+
+def _stamps(parts: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Stamps (n,) [ns] from seconds and nanoseconds (2, n), as `stamp.stamp_of` has them."""
+    sane = np.all((parts >= -LATEST) & (parts <= LATEST), axis=0)
+    whole, part = np.where(sane, parts, 0)
+    return np.where(sane, whole * 1_000_000_000 + part, NO_STAMP)
+
+
+def _shape_of(raw: bytes, paths: Sequence[FieldPath]) -> _Shape | None:
+    """The shape that a message shows; None where it is no JSON of a shape, or lacks a wanted number."""
+    walk = _Walk(raw)
+    try:
+        walk.value("", depth=0)
+        if raw[walk.at :].strip(b" \t\n\r"):
+            return None
+    except (_UnlikeError, ValueError):
+        return None
+    none = np.empty(0, np.uint8)
+    layout = Layout(none, none, walk.leaves, walk.texts)
+    places = [place(layout, path) for path in paths]
+    known = [own.offset for own in places if own is not None]
+    if len(known) < len(paths):
+        return None
+    own_stamp = stamp_places(layout)
+    wanted = [*known, *([] if own_stamp is None else (own.offset for own in own_stamp))]
+    slot, rows = np.full(len(walk.numbers), -1, np.int64), []
+    for token in wanted:
+        slot[token] = slot.max(initial=-1) + 1 if slot[token] < 0 else slot[token]
+        rows.append(int(slot[token]))
+    ends = np.array([0, *(end for _, end in walk.numbers)])
+    starts = np.array([*(start for start, _ in walk.numbers), len(raw)])
+    pieces = [raw[end:start] for end, start in zip(ends.tolist(), starts.tolist(), strict=True)]
+    edges = np.concatenate([[0], np.cumsum(starts - ends)])
+    text = np.frombuffer(b"".join(pieces), np.uint8)
+    stamp = None if own_stamp is None else (rows[-2], rows[-1])
+    return _Shape(text, edges.astype(np.int64), slot, tuple(rows[: len(paths)]), stamp)
+
+
+class _UnlikeError(Exception):
+    """A text of which no shape can be made."""
+
+
+class _Walk:
+    """Goes through one JSON text, noting where its numbers stand; leaves are counted in numbers."""
+
+    def __init__(self, raw: bytes) -> None:
+        self.raw = raw
+        self.at = 0
+        self.numbers: list[tuple[int, int]] = []
+        self.leaves: dict[str, Leaf] = {}
+        self.texts: dict[str, tuple[str, ...]] = {}
+
+    def value(self, path: str, *, depth: int) -> str:
+        """Pass over a value at a path; what it is: a mark, "text", "number" or "word"."""
+        if depth > _DEEPEST or len(self.numbers) > _MOST_NUMBERS:
+            raise _UnlikeError
+        mark, _, number, word = self._next()
+        if number is not None:
+            self.leaves[path] = Leaf(len(self.numbers), "f8", 1)
+            self.numbers.append((self.at - len(number), self.at))
+            return "number"
+        if mark == b"{":
+            self._object(path, depth)
+        elif mark == b"[":
+            self._array(path, depth)
+        elif mark is not None:
+            raise _UnlikeError
+        return "word" if word else "text" if mark is None else mark.decode()
+
+    def _object(self, path: str, depth: int) -> None:
+        seen: set[str] = set()
+        while True:
+            mark, text, _, _ = self._next()
+            if mark == b"}" and not seen:
+                return
+            if text is None or self._next()[0] != b":":
+                raise _UnlikeError
+            name = str(json.loads(text))
+            if name in seen:
+                raise _UnlikeError  # the last of several counts
+            seen.add(name)
+            self.value(f"{path}.{name}" if path else name, depth=depth + 1)
+            mark, _, _, _ = self._next()
+            if mark == b"}":
+                return
+            if mark != b",":
+                raise _UnlikeError
+
+    def _array(self, path: str, depth: int) -> None:
+        first = len(self.numbers)
+        kinds: list[str] = []
+        texts: list[bytes] = []
+        before = self.at
+        if self._next()[0] == b"]":
+            self.texts[path] = ()
+            return
+        self.at = before
+        while True:
+            begin = self.at
+            kinds.append(self.value(f"{path}[{len(kinds)}]", depth=depth + 1))
+            texts.append(self.raw[begin : self.at])
+            mark, _, _, _ = self._next()
+            if mark == b"]":
+                break
+            if mark != b",":
+                raise _UnlikeError
+        if set(kinds) == {"number"}:
+            self.leaves[path] = Leaf(first, "f8", 1, len(kinds))
+        if set(kinds) == {"text"}:
+            self.texts[path] = tuple(str(json.loads(text)) for text in texts)
+
+    def _next(self) -> tuple[bytes | None, bytes | None, bytes | None, bytes | None]:
+        """The next token: a mark, a text, a number or a word."""
+        found = _TOKEN.match(self.raw, self.at)
+        if found is None:
+            raise _UnlikeError
+        self.at = found.end()
+        return found[1], found[2], found[3], found[4]
