@@ -4,7 +4,7 @@ A `Signal` says where one quantity stands in one file format and how to convert 
 
     SI value = logged value x (unit's factor) x scale x sign + offset
 
-with the offset in SI. `Signals` collects the quantities of one format, `RigSignals` both formats.
+with the offset in SI. `Signals` collects the quantities of one format, `RigSignals` all formats.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,17 @@ from data.recording import Axis
 from data.units import Quantity, factor_to_si, parse_unit
 
 FloatArray = NDArray[np.float64]
-Format = Literal["csv", "mcap"]
+Format = Literal["csv", "mcap", "parquet", "mat"]
+FORMATS: Final[tuple[Format, ...]] = get_args(Format)
 Clock = Literal["header", "log", "publish"]
-SUFFIXES: Final[dict[str, Format]] = {".mcap": "mcap", ".csv": "csv", ".tsv": "csv", ".txt": "csv"}
+SUFFIXES: Final[dict[str, Format]] = {
+    ".mcap": "mcap",
+    ".csv": "csv",
+    ".tsv": "csv",
+    ".txt": "csv",
+    ".parquet": "parquet",
+    ".mat": "mat",
+}
 
 
 @dataclass(frozen=True)
@@ -34,7 +42,7 @@ class Signal:
     Raises LogError when the unit word is unknown, or scale, sign or offset cannot be.
     """
 
-    source: str | int  # CSV: header, header without its unit, or number from 0; MCAP: topic:field.path[i]
+    source: str | int  # CSV, Parquet: header, or number from 0; MCAP: topic:field.path[i]; MATLAB: data.q
     unit: str | None = None  # None: SI
     scale: float | None = None  # [-], for A or V [N m/A] or [N m/V]; None: 1
     sign: int = 1  # +1 or -1
@@ -89,7 +97,7 @@ class Signals:
 
     position: Signal | None = None
     torque: Signal | None = None
-    time: Signal | None = None  # CSV: needed unless a column is plainly the time; MCAP: None is the stamp
+    time: Signal | None = None  # needed unless a column is plainly the time; MCAP: None is the stamp
     velocity: Signal | None = None
     reference: Signal | None = None
     clock: Clock | None = None  # MCAP: which stamp is the time; None: the header's where sane, else the log's
@@ -102,6 +110,8 @@ class RigSignals:
 
     csv: Signals | None = None
     mcap: Signals | None = None
+    parquet: Signals | None = None
+    mat: Signals | None = None
 
     def of(self, file_format: Format) -> Signals:
         """The names in one format.
@@ -111,7 +121,7 @@ class RigSignals:
         LogError
             When the campaign names nothing in that format.
         """
-        found = self.csv if file_format == "csv" else self.mcap
+        found: Signals | None = getattr(self, file_format)
         if found is None:
             raise LogError(
                 f'the campaign\'s [signals] names nothing for {file_format} logs; add {file_format} = "..." '
@@ -121,7 +131,7 @@ class RigSignals:
 
 
 def log_format(path: Path) -> Format:
-    """The format that a file's name promises: `.mcap`, or any of `.csv`, `.tsv`, `.txt`.
+    """The format that a file's name promises, by its ending (`SUFFIXES`).
 
     Raises
     ------

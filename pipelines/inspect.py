@@ -17,12 +17,18 @@ from data.csv.description import CsvDescription
 from data.findings import LogError
 from data.ingest import read_bytes
 from data.integrity import Integrity
+from data.mat.log import MatLog
 from data.mcap import description as mcap_description
 from data.mcap.description import McapDescription
+from data.mcap.records import ByteArray
+from data.parquet.log import ParquetLog
 from data.signals import Format, log_format
+from data.tables import description as table_description
+from data.tables.description import TableDescription
 from pipelines.exit_status import Status
 
 SCHEMA: Final = "stribeck/inspection/1"
+Description = McapDescription | CsvDescription | TableDescription
 
 
 @dataclass(frozen=True)
@@ -33,7 +39,7 @@ class Inspection:
     file_format: Format
     size: int  # [bytes]
     seconds: float  # that the inspection took
-    content: McapDescription | CsvDescription
+    content: Description
 
     @property
     def integrity(self) -> Integrity:
@@ -65,18 +71,22 @@ def inspect_log(path: Path) -> Inspection:
     log = path.as_posix()
     content = read_bytes(path, log=log)  # a file that is not there has no ending to speak of
     file_format = log_format(path)
-    found: McapDescription | CsvDescription
-    if file_format == "mcap":
-        found = mcap_description.describe(content)
-    else:
-        try:
-            found = csv_description.describe(content.tobytes())
-        except LogError as error:
-            raise LogError(f"{log}: {error}") from error
+    try:
+        found = _described(file_format, content)
+    except LogError as error:
+        raise LogError(f"{log}: {error}") from error
     inspection = Inspection(log, file_format, content.size, time.perf_counter() - begin, found)
     if inspection.status is Status.REFUSED:
         inspection.integrity.require(log, salvage=True)
     return inspection
+
+
+def _described(file_format: Format, content: ByteArray) -> Description:
+    if file_format == "mcap":
+        return mcap_description.describe(content)
+    if file_format == "csv":
+        return csv_description.describe(content.tobytes())
+    return table_description.describe((ParquetLog if file_format == "parquet" else MatLog)(content))
 
 
 def to_plain(inspection: Inspection) -> dict[str, Any]:
@@ -94,7 +104,10 @@ def to_plain(inspection: Inspection) -> dict[str, Any]:
         "integrity": _integrity(inspection.integrity),
         "metadata": dict(content.metadata),
     }
-    own = _mcap(content) if isinstance(content, McapDescription) else _csv(content)
+    if isinstance(content, McapDescription):
+        own = _mcap(content)
+    else:
+        own = _columns(content) | (_dialect(content) if isinstance(content, CsvDescription) else {})
     return {key: _finite(value) for key, value in (shared | own).items()}
 
 
@@ -110,7 +123,7 @@ def _mcap(content: McapDescription) -> dict[str, Any]:
     }
 
 
-def _csv(content: CsvDescription) -> dict[str, Any]:
+def _dialect(content: CsvDescription) -> dict[str, Any]:
     layout = content.layout
     return {
         "dialect": {
@@ -120,7 +133,12 @@ def _csv(content: CsvDescription) -> dict[str, Any]:
             "header": bool(layout.headers),
             "comment": layout.comment,
             "lines_before_numbers": layout.first_row,
-        },
+        }
+    }
+
+
+def _columns(content: CsvDescription | TableDescription) -> dict[str, Any]:
+    return {
         "rows": content.rows,
         "columns": [asdict(column) for column in content.columns],
         "clock": _rated(asdict(content.clock)) if content.clock else None,

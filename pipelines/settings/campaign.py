@@ -24,13 +24,21 @@ from pydantic import ValidationError
 from data.findings import LogError
 from data.protocols import ProtocolName
 from data.recording import Axis
-from data.signals import SUFFIXES, CsvDialect, Format, RigSignals, Signal, Signals, log_format
+from data.signals import (
+    FORMATS,
+    SUFFIXES,
+    CsvDialect,
+    Format,
+    RigSignals,
+    Signal,
+    Signals,
+    log_format,
+)
 from data.units import Quantity
 from ident.model.friction import ModelError, StribeckCurve, StribeckFriction
 from pipelines.results.folder import Owner
 from pipelines.settings.campaign_error import CampaignError, explained, nearest
 from pipelines.settings.campaign_schema import (
-    FORMATS,
     METADATA,
     SIGNAL_NAMES,
     CampaignDocument,
@@ -242,21 +250,20 @@ class _Reader:
         tables = {name: getattr(entry, name) or getattr(self.signals, name) for name in SIGNAL_NAMES}
         dialect = entry.dialect or self.signals.dialect
         try:
-            csv, mcap = (_named_signals(tables, kind, self.rig) for kind in FORMATS)
+            named = {kind: _named_signals(tables, kind, self.rig) for kind in FORMATS}
             used = {log: log_format(Path(log)) for log in logs}
         except LogError as failure:
             raise CampaignError(f"{where}: {failure}") from None
         for log, log_kind in used.items():
-            named = csv if log_kind == "csv" else mcap
-            for name, signal in (("position", named.position), ("torque", named.torque)):
-                if signal is None:
+            for name in ("position", "torque"):
+                if getattr(named[log_kind], name) is None:
                     raise CampaignError(
                         f"{where}: {log} is a {log_kind} log, and [signals] does not say where {name} stands "
                         f'in those. Add {name} = {{ {log_kind} = "..." }}'
                     )
         if dialect is not None:
-            csv = replace(csv, dialect=CsvDialect(**dialect.model_dump()))
-        return RigSignals(csv=csv, mcap=mcap)
+            named["csv"] = replace(named["csv"], dialect=CsvDialect(**dialect.model_dump()))
+        return RigSignals(**named)
 
     def _set_point(self, where: str, entry: ExperimentTable, logs: Sequence[str]) -> SetPointSettings | None:
         if entry.protocol != "set_point":
@@ -301,7 +308,7 @@ def _named_signals(tables: Mapping[str, SignalTable | None], log_kind: Format, r
     """What the logs of one format call things; raises `LogError` for a unit that does not fit."""
     found: dict[str, Signal] = {}
     for name, table in tables.items():
-        source = None if table is None else table.csv if log_kind == "csv" else table.mcap
+        source = None if table is None else table.source(log_kind)
         if table is not None and source is not None:
             unit = table.unit.get(log_kind)
             try:

@@ -14,12 +14,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_valida
 
 from data.protocols import ProtocolName
 from data.recording import Axis
-from data.signals import Format
+from data.signals import FORMATS, Format
 from pipelines.settings.loop import ObserverUpdate
 from pipelines.settings.virtual_rig import VirtualRig
 
 METADATA: Final = "metadata:"  # a gain that stands in each log
-FORMATS: Final[tuple[Format, ...]] = ("csv", "mcap")
 SIGNAL_NAMES: Final = ("time", "position", "torque", "velocity", "reference")
 LARGEST_GAIN: Final = 1e9
 SET_POINT_KEYS: Final = (
@@ -74,7 +73,7 @@ def _unit(value: object) -> object:
 
 
 def _column(value: object) -> object:
-    """The text of a CSV column's header, or its number."""
+    """The text of a column's header, or its number."""
     if isinstance(value, bool) or not isinstance(value, (int, str)) or (isinstance(value, int) and value < 0):
         raise ValueError(f"{value!r} is no column: give its header's text, or its number from 0")
     return value
@@ -110,6 +109,8 @@ class SignalTable(_Table):
 
     csv: Annotated[str | int | None, BeforeValidator(_column)] = None
     mcap: str | None = None
+    parquet: Annotated[str | int | None, BeforeValidator(_column)] = None
+    mat: str | None = None
     unit: UnitEntry = Field(default_factory=dict)
     scale: Number | None = None
     sign: Annotated[Literal[1, -1], BeforeValidator(_sign)] = 1
@@ -118,11 +119,19 @@ class SignalTable(_Table):
 
     @model_validator(mode="after")
     def _somewhere(self) -> Self:
-        if self.csv is None and self.mcap is None and self.clock is None:
-            raise ValueError('no source: give csv = "COLUMN", mcap = "TOPIC:FIELD", or both')
+        if all(self.source(kind) is None for kind in FORMATS) and self.clock is None:
+            raise ValueError(
+                'no source: give csv = "COLUMN", mcap = "TOPIC:FIELD", parquet = "COLUMN", or '
+                'mat = "NAME.FIELD"'
+            )
         if self.scale == 0:
             raise ValueError("scale is 0: every logged value would be the same")
         return self
+
+    def source(self, kind: Format) -> str | int | None:
+        """Where it stands in logs of one format; None: it is not named there."""
+        found: str | int | None = getattr(self, kind)
+        return found
 
 
 class DialectTable(_Table):

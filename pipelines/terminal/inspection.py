@@ -24,14 +24,16 @@ from data.findings import LogError
 from data.integrity import Integrity
 from data.mcap.description import ChannelDescription, Field, McapDescription
 from data.names import shown
+from data.tables.description import DescribedColumn, TableDescription
 from pipelines.exit_status import Status
-from pipelines.inspect import SCHEMA, Inspection, inspect_log, to_plain
+from pipelines.inspect import SCHEMA, Description, Inspection, inspect_log, to_plain
 
 MANY: Final = "stribeck/inspections/1"  # the schema of several inspections at once
 _EPOCH: Final = 1e8  # [s]; a start above this is a date
 _LATEST: Final = 4e9
 _MOST_ROWS: Final = 40
 _MOST_LOSSES: Final = 8
+_KINDS: Final = {"csv": "CSV", "parquet": "Parquet", "mat": "MATLAB"}
 
 
 def inspect_logs(logs: Sequence[Path], *, as_json: bool = False, quiet: bool = False) -> Status:
@@ -96,8 +98,10 @@ def _facts(inspection: Inspection) -> Table:
         ]
         facts.add_row("file", Text(" · ".join(part for part in parts if part)))
     else:
-        facts.add_row("file", Text(f"CSV · {_size(inspection.size)} · {content.rows} rows"))
-        facts.add_row("dialect", Text(shown(content.layout.described)))
+        kind = _KINDS[inspection.file_format]
+        facts.add_row("file", Text(f"{kind} · {_size(inspection.size)} · {content.rows} rows"))
+        if isinstance(content, CsvDescription):
+            facts.add_row("dialect", Text(shown(content.layout.described)))
         if content.clock is not None:
             facts.add_row("clock", _clock(content.clock, f"column {shown(content.clock_column or '', 40)}"))
     facts.add_row("integrity", _integrity(inspection.integrity))
@@ -215,7 +219,7 @@ def _size(count: int) -> str:
     return f"{count} bytes"
 
 
-def _columns(content: CsvDescription) -> Table:
+def _columns(content: CsvDescription | TableDescription) -> Table:
     table = Table(box=None, pad_edge=False, header_style="dim")
     for heading, justify in (
         ("no.", "right"),
@@ -233,15 +237,20 @@ def _columns(content: CsvDescription) -> Table:
             Text(shown(column.unit or "", 20)),
             "" if column.low is None else f"{column.low:.6g}",
             "" if column.high is None else f"{column.high:.6g}",
-            Text(_remark(column), style="yellow"),
+            Text(_remark(column, content.rows), style="yellow"),
         )
     return table
 
 
-def _remark(column: Column) -> str:
+def _remark(column: Column | DescribedColumn, rows: int) -> str:
     if column.text is not None:
         return "no numbers: " + shown(column.text, 80)
-    return f"{column.missing} cells are empty or not finite" if column.missing else ""
+    own = column.rows if isinstance(column, DescribedColumn) else rows
+    parts = [
+        f"{own} values" if own != rows else "",
+        f"{column.missing} cells are empty or not finite" if column.missing else "",
+    ]
+    return "; ".join(part for part in parts if part)
 
 
 def _more(content: McapDescription) -> list[RenderableType]:
@@ -261,7 +270,7 @@ def _more(content: McapDescription) -> list[RenderableType]:
     return rows
 
 
-def _metadata(content: McapDescription | CsvDescription) -> Table:
+def _metadata(content: Description) -> Table:
     table = Table.grid(padding=(0, 2))
     table.add_row(Text("\nmetadata", style="dim"))
     plain = {key: value for key, value in content.metadata.items() if "/" not in key} or content.metadata

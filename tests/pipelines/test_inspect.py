@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
 from rich.console import Console
 
 from data.csv.log import write_csv
 from data.findings import LogError
 from data.mcap.writer import write_mcap
+from data.parquet.writer import write_parquet
 from pipelines.exit_status import Status
 from pipelines.inspect import SCHEMA, inspect_log, to_plain
 from pipelines.terminal.inspection import inspect_logs, print_inspection
@@ -75,6 +77,46 @@ def test_a_csv_log(tmp_path: Path) -> None:
     text = drawn(path)
     for word in ("SIMULATED", "comma between cells", "100 Hz", "q [deg]", "2.97"):
         assert word in text
+
+
+def test_a_parquet_log(tmp_path: Path) -> None:
+    path = tmp_path / "run.parquet"
+    time = np.arange(100, dtype=np.float64) * 0.01
+    time[60:] += 0.5
+    columns = {"time": 1e3 * time, "q": 3 * time, "name": -time}
+    write_parquet(path, columns=columns, units={"time": "ms", "q": "deg"}, metadata={"simulated": "true"})
+    found = to_plain(inspect_log(path))
+    assert (found["format"], found["status"], found["simulated"], found["rows"]) == (
+        "parquet",
+        "whole",
+        True,
+        100,
+    )
+    assert found["integrity"]["checksums"] == "verified"
+    assert [column["unit"] for column in found["columns"]] == ["ms", "deg", None]
+    assert found["clock_column"] == "time"
+    assert found["clock"]["rate"] == pytest.approx(100.0)
+    assert (found["clock"]["gaps"], found["clock"]["duration"]) == (1, pytest.approx(1.49))
+    text = drawn(path)
+    for word in ("SIMULATED", "Parquet", "checksums verified", "100 rows", "100 Hz", "1 gaps", "deg"):
+        assert word in text
+
+
+def test_a_matlab_log(tmp_path: Path) -> None:
+    path = tmp_path / "run.mat"
+    time = np.arange(100, dtype=np.float64) * 0.01
+    data = {"t": time, "q": 3 * time, "short": time[:5], "on": time > 0.5}
+    scipy.io.savemat(path, {"data": data, "r": 0.9, "note": "\x1b[31mred"})
+    found = to_plain(inspect_log(path))
+    assert (found["format"], found["status"], found["rows"]) == ("mat", "whole", 100)
+    assert found["integrity"]["checksums"] == "absent"
+    assert found["metadata"]["r"] == "0.9"
+    assert [column["header"] for column in found["columns"]] == ["data.t", "data.q", "data.short", "data.on"]
+    assert found["clock"]["rate"] == pytest.approx(100.0)
+    text = drawn(path)
+    for word in ("MATLAB", "data.q", "2.97", "5 values", "true and false", "100 Hz"):
+        assert word in text
+    assert "\x1b[31m" not in text
 
 
 def test_whole_partly_and_not_at_all(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

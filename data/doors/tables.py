@@ -1,0 +1,105 @@
+"""The door for logs that are typed columns: Parquet and MATLAB files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from data.began import began
+from data.doors.door import Door, FloatArray, Logged, interval, require_unit, unset
+from data.elapsed import unset_lead
+from data.findings import LogError
+from data.mat.log import MatLog
+from data.mcap.records import ByteArray
+from data.names import shown
+from data.parquet.log import ParquetLog
+from data.signals import Signal, log_format
+from data.tables.table import TIME_NAMES, Column, TableFile, Values, require_numbers
+from data.units import Quantity
+
+
+def read_parquet_log(door: Door, content: ByteArray) -> Logged:
+    """The wanted columns of a Parquet file in SI; raises LogError."""
+    return _read(door, content, ParquetLog)
+
+
+def read_mat_log(door: Door, content: ByteArray) -> Logged:
+    """The wanted arrays of a MATLAB file in SI; raises LogError."""
+    return _read(door, content, MatLog)
+
+
+def _read(door: Door, content: ByteArray, opened: Callable[[ByteArray], TableFile]) -> Logged:
+    try:
+        return _converted(door, opened(content))
+    except LogError as error:
+        text = str(error)
+        raise LogError(text if text.startswith(door.log) else f"{door.log}: {text}") from error
+
+
+def _converted(door: Door, table: TableFile) -> Logged:
+    wanted = door.wanted()
+    try:
+        time, places = _places(door, table, wanted)
+    except LogError as error:  # damage goes first: what is missing may be what is lost
+        damage = table.read([]).integrity.require(door.log, salvage=door.salvage)
+        raise LogError("; ".join((str(error), *(finding.text for finding in damage)))) from error
+    for quantity, signal in {**wanted, "time": time}.items():
+        column = table.columns[places[quantity]]
+        require_numbers(column)
+        require_unit(quantity, signal, column.unit, axis=door.axis)
+    read = table.read(sorted(set(places.values())))
+    findings = read.integrity.require(door.log, salvage=door.salvage)
+    columns = {quantity: table.columns[place] for quantity, place in places.items()}
+    values = {quantity: read.values[place] for quantity, place in places.items()}
+    _require_alike(columns, values)
+    clock = f"column {shown(columns['time'].name)!r}"
+    stamps = door.convert("time", interval(time), _floats(columns["time"], values["time"], stamp=True))
+    lead = unset_lead(stamps)
+    return Logged(
+        time=door.convert("time", interval(time), values["time"].since_first(lead)),
+        signals={
+            quantity: door.convert(quantity, signal, _floats(columns[quantity], values[quantity])[lead:])
+            for quantity, signal in wanted.items()
+        },
+        clock=clock,
+        metadata=table.metadata,
+        findings=(*findings, *unset(door, lead, clock)),
+        begun=began(float(stamps[lead]) if stamps.size > lead else 0.0, table.metadata),
+    )
+
+
+def _places(
+    door: Door, table: TableFile, wanted: Mapping[Quantity, Signal]
+) -> tuple[Signal, dict[Quantity, int]]:
+    """The signal that is the time, and where each quantity stands among the file's columns."""
+    places = {quantity: table.find(signal.source) for quantity, signal in wanted.items()}
+    if door.signals.time is not None:
+        return door.signals.time, places | {"time": table.find(door.signals.time.source)}
+    place = table.plain_time(wanted["position"].source)
+    if place is None:
+        kind = log_format(door.path)
+        raise LogError(
+            f"[signals] names no time for {kind} logs, and no column is plainly the time "
+            f'(one of {", ".join(TIME_NAMES)}); add time = {{ {kind} = "..." }}'
+        )
+    return Signal(place, unit=table.columns[place].unit), places | {"time": place}
+
+
+def _floats(column: Column, values: Values, *, stamp: bool = False) -> FloatArray:
+    """A column as floats; as a `stamp` it may be rounded, its differences are not taken from it."""
+    try:
+        return (replace(values, stored=values.stored.astype("f8")) if stamp else values).floats()
+    except LogError as error:
+        raise LogError(f"column {shown(column.name)!r} {error}") from error
+
+
+def _require_alike(columns: Mapping[Quantity, Column], values: Mapping[Quantity, Values]) -> None:
+    """Refuse signals of different lengths: which of their values belong together is not known."""
+    own = values["time"].stored.size
+    for quantity, column in columns.items():
+        if values[quantity].stored.size != own:
+            raise LogError(
+                f"{quantity} ({shown(column.name)}) has {values[quantity].stored.size} values, the time "
+                f"({shown(columns['time'].name)}) {own}: which belong together is not known. Name the time "
+                "that they were sampled with"
+            )
