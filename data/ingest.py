@@ -18,7 +18,7 @@ import numpy as np
 
 from data.doors.csv import read_csv_log
 from data.doors.door import Door, Logged
-from data.doors.mcap import read_mcap_log
+from data.doors.messages import read_bag_log, read_mcap_log
 from data.doors.tables import read_mat_log, read_parquet_log
 from data.findings import LogError
 from data.mcap.records import ByteArray
@@ -36,6 +36,7 @@ _READERS: Final[dict[Format, Callable[[Door, ByteArray], Logged]]] = {
     "mcap": read_mcap_log,
     "parquet": read_parquet_log,
     "mat": read_mat_log,
+    "bag": read_bag_log,
 }
 
 

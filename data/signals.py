@@ -22,7 +22,7 @@ from data.recording import Axis
 from data.units import Quantity, factor_to_si, parse_unit
 
 FloatArray = NDArray[np.float64]
-Format = Literal["csv", "mcap", "parquet", "mat"]
+Format = Literal["csv", "mcap", "parquet", "mat", "bag"]
 FORMATS: Final[tuple[Format, ...]] = get_args(Format)
 Clock = Literal["header", "log", "publish"]
 SUFFIXES: Final[dict[str, Format]] = {
@@ -32,6 +32,8 @@ SUFFIXES: Final[dict[str, Format]] = {
     ".txt": "csv",
     ".parquet": "parquet",
     ".mat": "mat",
+    ".bag": "bag",
+    ".db3": "bag",
 }
 
 
@@ -42,7 +44,7 @@ class Signal:
     Raises LogError when the unit word is unknown, or scale, sign or offset cannot be.
     """
 
-    source: str | int  # CSV, Parquet: header, or number from 0; MCAP: topic:field.path[i]; MATLAB: data.q
+    source: str | int  # CSV, Parquet: header, or number from 0; MCAP, bag: topic:field[i]; MATLAB: data.q
     unit: str | None = None  # None: SI
     scale: float | None = None  # [-], for A or V [N m/A] or [N m/V]; None: 1
     sign: int = 1  # +1 or -1
@@ -97,10 +99,10 @@ class Signals:
 
     position: Signal | None = None
     torque: Signal | None = None
-    time: Signal | None = None  # needed unless a column is plainly the time; MCAP: None is the stamp
+    time: Signal | None = None  # needed unless a column is plainly the time; messages: None is the stamp
     velocity: Signal | None = None
     reference: Signal | None = None
-    clock: Clock | None = None  # MCAP: which stamp is the time; None: the header's where sane, else the log's
+    clock: Clock | None = None  # messages: which stamp; None: the header's where sane, else the log's
     dialect: CsvDialect | None = None  # CSV: how the file is written, where it shall not be sniffed
 
 
@@ -112,6 +114,7 @@ class RigSignals:
     mcap: Signals | None = None
     parquet: Signals | None = None
     mat: Signals | None = None
+    bag: Signals | None = None
 
     def of(self, file_format: Format) -> Signals:
         """The names in one format.

@@ -12,6 +12,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
+from data.bag import description as bag_description
 from data.csv import description as csv_description
 from data.csv.description import CsvDescription
 from data.findings import LogError
@@ -72,7 +73,7 @@ def inspect_log(path: Path) -> Inspection:
     content = read_bytes(path, log=log)  # a file that is not there has no ending to speak of
     file_format = log_format(path)
     try:
-        found = _described(file_format, content)
+        found = _described(path, file_format, content)
     except LogError as error:
         raise LogError(f"{log}: {error}") from error
     inspection = Inspection(log, file_format, content.size, time.perf_counter() - begin, found)
@@ -81,7 +82,9 @@ def inspect_log(path: Path) -> Inspection:
     return inspection
 
 
-def _described(file_format: Format, content: ByteArray) -> Description:
+def _described(path: Path, file_format: Format, content: ByteArray) -> Description:
+    if file_format == "bag":
+        return bag_description.describe(path)
     if file_format == "mcap":
         return mcap_description.describe(content)
     if file_format == "csv":

@@ -125,7 +125,7 @@ def _channel(part: _Seen) -> ChannelDescription:
     fields: tuple[Field, ...] = ()
     refused = None
     try:
-        fields = _fields(decoder(part.channel, part.schema)(part.first))
+        fields = described_fields(decoder(part.channel, part.schema)(part.first))
     except LogError as error:
         refused = str(error)
     return ChannelDescription(
@@ -140,7 +140,8 @@ def _channel(part: _Seen) -> ChannelDescription:
     )
 
 
-def _fields(message: object) -> tuple[Field, ...]:
+def described_fields(message: object) -> tuple[Field, ...]:
+    """The fields of a decoded message, for a person to choose from."""
     listed = []
     found = dict(leaves(message))
     for path, value in list(found.items())[:_MOST_FIELDS]:

@@ -111,6 +111,7 @@ class SignalTable(_Table):
     mcap: str | None = None
     parquet: Annotated[str | int | None, BeforeValidator(_column)] = None
     mat: str | None = None
+    bag: str | None = None
     unit: UnitEntry = Field(default_factory=dict)
     scale: Number | None = None
     sign: Annotated[Literal[1, -1], BeforeValidator(_sign)] = 1

@@ -24,6 +24,7 @@ from data.findings import LogError
 from data.integrity import Integrity
 from data.mcap.description import ChannelDescription, Field, McapDescription
 from data.names import shown
+from data.signals import Format
 from data.tables.description import DescribedColumn, TableDescription
 from pipelines.exit_status import Status
 from pipelines.inspect import SCHEMA, Description, Inspection, inspect_log, to_plain
@@ -33,7 +34,13 @@ _EPOCH: Final = 1e8  # [s]; a start above this is a date
 _LATEST: Final = 4e9
 _MOST_ROWS: Final = 40
 _MOST_LOSSES: Final = 8
-_KINDS: Final = {"csv": "CSV", "parquet": "Parquet", "mat": "MATLAB"}
+_KINDS: Final[dict[Format, str]] = {
+    "mcap": "MCAP",
+    "bag": "ROS bag",
+    "csv": "CSV",
+    "parquet": "Parquet",
+    "mat": "MATLAB",
+}
 
 
 def inspect_logs(logs: Sequence[Path], *, as_json: bool = False, quiet: bool = False) -> Status:
@@ -85,15 +92,11 @@ def _facts(inspection: Inspection) -> Table:
     facts.add_column()
     content = inspection.content
     if isinstance(content, McapDescription):
-        chunks = ", ".join(
-            f"{count} {shown(name, 20)} chunks" for name, count in content.compressions.items()
-        )
         parts = [
-            "MCAP",
+            _KINDS[inspection.file_format],
             _size(inspection.size),
             f"profile {shown(content.profile, 30) or 'none'}",
-            chunks or "no chunks",
-            "indexed" if content.indexed else "no index",
+            *_container(inspection.file_format, content),
             f"by {shown(content.library, 40)}" if content.library else "",
         ]
         facts.add_row("file", Text(" · ".join(part for part in parts if part)))
@@ -106,6 +109,14 @@ def _facts(inspection: Inspection) -> Table:
             facts.add_row("clock", _clock(content.clock, f"column {shown(content.clock_column or '', 40)}"))
     facts.add_row("integrity", _integrity(inspection.integrity))
     return facts
+
+
+def _container(file_format: Format, content: McapDescription) -> tuple[str, ...]:
+    """How an MCAP file is built."""
+    if file_format != "mcap":
+        return ()
+    chunks = ", ".join(f"{count} {shown(name, 20)} chunks" for name, count in content.compressions.items())
+    return chunks or "no chunks", "indexed" if content.indexed else "no index"
 
 
 def _integrity(found: Integrity) -> Text:

@@ -170,7 +170,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
         ("empty.mcap", "0 bytes"),
         ("folder.mcap", "is a folder"),
         ("noise.mcap", "does not begin as an MCAP file|no topic"),
-        ("run.bag", "by their ending"),
+        ("run.xyz", "by their ending"),
     ):
         with pytest.raises(LogError, match=why):
             read(tmp_path / name)

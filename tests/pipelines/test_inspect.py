@@ -182,9 +182,9 @@ def test_names_from_a_log_are_only_names(tmp_path: Path) -> None:
 def test_a_file_that_is_not_there_is_told_before_its_ending(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="nothere: there is no such file"):
         inspect_log(tmp_path / "nothere")
-    (tmp_path / "log.bag").write_bytes(b"#ROSBAG")
+    (tmp_path / "log.xyz").write_bytes(b"log")
     with pytest.raises(LogError, match="logs are read by their ending"):
-        inspect_log(tmp_path / "log.bag")
+        inspect_log(tmp_path / "log.xyz")
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,23 @@
-"""The door for MCAP logs: fields of messages, brought onto the clock of the position's topic."""
+"""The door for logs of messages, MCAP and ROS bags: fields brought onto the clock of the position's topic."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from data.alignment import align
+from data.bag.columns import read_columns as read_bag_columns
 from data.began import began
 from data.clocks import drift
 from data.doors.door import Door, FloatArray, Logged, interval, unset
 from data.elapsed import since_first, unset_lead
 from data.findings import Finding, LogError, Severity
+from data.integrity import Integrity
 from data.mcap.columns import McapColumns, Topic, read_columns, survey
 from data.mcap.field_path import FieldPath, parse_path
 from data.mcap.records import ByteArray
@@ -21,8 +26,26 @@ from data.signals import Clock, Signal
 from data.units import Quantity
 
 
+class _Columns(Protocol):
+    """Reads wanted fields of a log; one of them may be the clock."""
+
+    def __call__(self, wanted: Sequence[FieldPath], *, clock: FieldPath | None) -> McapColumns:
+        """Their columns; raises LogError."""
+
+
 def read_mcap_log(door: Door, content: ByteArray) -> Logged:
     """The wanted fields of an MCAP file in SI; raises LogError."""
+    return _read(door, partial(read_columns, content), partial(survey, content))
+
+
+def read_bag_log(door: Door, content: ByteArray) -> Logged:
+    """The wanted fields of a ROS bag in SI; raises LogError."""
+    if door.signals.clock == "publish":
+        raise LogError(f'{door.log}: a ROS bag keeps no publish times; set clock = "log" or "header"')
+    return _read(door, partial(read_bag_columns, door.path), lambda: Integrity("absent"))
+
+
+def _read(door: Door, columns: _Columns, surveyed: Callable[[], Integrity]) -> Logged:
     wanted = door.wanted()
     paths: dict[Quantity, FieldPath] = {}
     named: dict[Quantity, Signal] = dict(wanted)
@@ -34,9 +57,9 @@ def read_mcap_log(door: Door, content: ByteArray) -> Logged:
     except LogError as error:
         raise LogError(f"{door.log}: {error}") from error
     try:
-        read = read_columns(content, list(dict.fromkeys(paths.values())), clock=paths.get("time"))
+        read = columns(list(dict.fromkeys(paths.values())), clock=paths.get("time"))
     except LogError as error:  # damage goes first: what is missing may be what is lost
-        damage = survey(content).require(door.log, salvage=door.salvage)
+        damage = surveyed().require(door.log, salvage=door.salvage)
         raise LogError("; ".join((f"{door.log}: {error}", *(finding.text for finding in damage)))) from error
     damage = read.integrity.require(door.log, salvage=door.salvage)
     topic = read.topics[paths["position"].topic]
