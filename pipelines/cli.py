@@ -221,7 +221,7 @@ def simulate(
         source.moving(law), controller,
         start=start, duration=duration, sampling=sampling, axis=axis_of(source),
     )  # fmt: skip
-    path = write_trajectory(run, folder, form=written_as)
+    path = write_trajectory(run, folder, form=written_as, axis=axis_of(source))
     options = {"x0": list(start), "duration": duration, "law": law, "compensator": compensator}
     conclude(folder, source, "simulate", options)
     x1, x2, x3 = (float(value) for value in run.state[-1])

@@ -11,19 +11,19 @@ rig runs it: rows at the sampling instants, the estimate and the torque held in 
 from __future__ import annotations
 
 import math
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal, get_args
 
 import numpy as np
-import pandas as pd
 
 from compensation.closed_loop import ClosedLoop, simulate, torque
 from compensation.controller import Controller
 from compensation.sampled_loop import Sampling, run_sampled
 from data.mcap.writer import write_mcap
+from data.parquet.writer import write_parquet
 from data.recording import Axis, FloatArray
+from data.units import Quantity, si_word
 from ident.model.numbers import LARGEST, is_quantity
 from ident.model.robot import OneLinkRobot
 from ident.response import respond
@@ -33,6 +33,7 @@ from pipelines.results.folder import ResultFolder
 Format = Literal["csv", "mcap", "parquet"]
 FORMATS: Final[tuple[Format, ...]] = get_args(Format)
 HEADER: Final = ("t", "x1", "x2", "x3", "v", "u")
+_MEANS: Final[tuple[Quantity, ...]] = ("time", "position", "velocity", "velocity", "velocity", "torque")
 OUTPUT_STEP: Final = 1e-3  # [s] between the rows of a continuous run
 MOST_ROWS: Final = 200_000  # of a continuous run
 MOST_TURNS: Final = 1e4  # that a continuous run may take before its gains are to blame
@@ -95,27 +96,33 @@ def simulate_loop(
     return _sampled(robot, controller, sampling, start=start, duration=duration, axis=axis)
 
 
-def write_trajectory(run: SimulatedRun, folder: ResultFolder, *, form: Format = "csv") -> Path:
+def write_trajectory(
+    run: SimulatedRun, folder: ResultFolder, *, form: Format = "csv", axis: Axis = "rotary"
+) -> Path:
     """The trajectory, simulated as it is: a table as CSV or Parquet, or joint states and x2 as MCAP."""
     table = np.column_stack((run.time, run.state, run.velocity, run.torque))
     if form == "csv":
         return folder.write_csv("trajectory.csv", HEADER, table.tolist())
+    labels = {"simulated": "true", "loop": run.loop}
     if form == "parquet":
-        frame = pd.DataFrame(table, columns=list(HEADER))
-        frame.attrs = {"simulated": True, "loop": run.loop}
-        return folder.write_bytes("trajectory.parquet", frame.to_parquet(index=False))
-    with tempfile.TemporaryDirectory() as scratch:
-        path = Path(scratch) / "trajectory.mcap"
-        write_mcap(
+        columns = {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(HEADER)}
+        units = {name: si_word(means, axis) for name, means in zip(HEADER, _MEANS, strict=True)}
+        return folder.write_by(
+            "trajectory.parquet",
+            lambda path: write_parquet(path, columns=columns, units=units, metadata=labels),
+        )
+    return folder.write_by(
+        "trajectory.mcap",
+        lambda path: write_mcap(
             path,
             time=run.time,
             position=np.ascontiguousarray(run.state[:, 0]),
             velocity=run.velocity,
             effort=run.torque,
-            metadata={"simulated": "true", "loop": run.loop},
+            metadata=labels,
             extra={"/velocity_estimate": np.ascontiguousarray(run.state[:, 1])},
-        )
-        return folder.write_bytes("trajectory.mcap", path.read_bytes())
+        ),
+    )
 
 
 def _continuous(

@@ -18,7 +18,7 @@ import json
 import math
 import re
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Final
@@ -66,6 +66,17 @@ class ResultFolder:
         target.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(target, content)
         self.written[name] = hashlib.sha256(content).hexdigest()
+        return target
+
+    def write_by(self, name: str, write: Callable[[Path], object]) -> Path:
+        """Have a result file written by `write`, which writes its path whole or not at all."""
+        target = self.path / name
+        if not (self.path / MANIFEST).exists():
+            self.claim()
+        target.parent.mkdir(parents=True, exist_ok=True)
+        write(target)
+        with target.open("rb") as stream:
+            self.written[name] = hashlib.file_digest(stream, "sha256").hexdigest()
         return target
 
     def write_json(self, name: str, schema: str, values: Mapping[str, object]) -> Path:

@@ -18,9 +18,10 @@ import numpy as np
 from data.csv.log import write_csv
 from data.findings import LogError
 from data.mcap.writer import Encoding, write_mcap
+from data.parquet.writer import write_parquet
 from data.recording import Axis, FloatArray
 from data.signals import RigSignals, Signal, Signals, log_format
-from data.units import Quantity, factor_to_si
+from data.units import Quantity, factor_to_si, si_word
 from pipelines.settings.campaign_error import CampaignError
 
 EPOCH: Final = 1_700_000_000_000_000_000  # [ns]: a virtual rig's clock starts on 14 November 2023, always
@@ -49,8 +50,12 @@ def write_log(
         signals = look.signals.of(kind)
         if kind == "csv":
             _write_csv(path, look, signals, values, labelled)
-        else:
+        elif kind == "parquet":
+            _write_parquet(path, look, signals, values, labelled)
+        elif kind == "mcap":
             _write_mcap(path, look, signals, values, labelled)
+        else:
+            raise LogError(f"the virtual rig writes csv, mcap and parquet logs, no {kind}")
     except LogError as failure:
         raise CampaignError(f"virtual rig: {path.name}: {failure}") from None
 
@@ -84,7 +89,27 @@ def _write_csv(
 ) -> None:
     if signals.dialect is not None and signals.dialect.delimiter not in {None, ","}:
         raise LogError("the virtual rig writes CSV with commas; leave `delimiter` out")
+    columns, _ = _columns(look, signals, values)
+    write_csv(path, columns={name: np.round(array, 12) for name, array in columns.items()}, metadata=metadata)
+
+
+def _write_parquet(
+    path: Path,
+    look: Look,
+    signals: Signals,
+    values: Mapping[Quantity, FloatArray],
+    metadata: Mapping[str, str],
+) -> None:
+    columns, units = _columns(look, signals, values)
+    write_parquet(path, columns=columns, units=units, metadata=metadata)
+
+
+def _columns(
+    look: Look, signals: Signals, values: Mapping[Quantity, FloatArray]
+) -> tuple[dict[str, FloatArray], dict[str, str]]:
+    """What is logged of each quantity that has a column, and its unit, by the column's name."""
     columns: dict[str, FloatArray] = {}
+    units: dict[str, str] = {}
     for quantity, array in values.items():
         signal = Signal("t") if quantity == "time" and signals.time is None else _named(signals, quantity)
         if signal is None:
@@ -93,8 +118,9 @@ def _write_csv(
             raise LogError(
                 f"the virtual rig writes columns by name, and {quantity} is column {signal.source}"
             )
-        columns[signal.source] = np.round(_logged(look, signal, quantity, array), 12)
-    write_csv(path, columns=columns, metadata=metadata)
+        columns[signal.source] = _logged(look, signal, quantity, array)
+        units[signal.source] = signal.unit or si_word(quantity, look.axis)
+    return columns, units
 
 
 def _write_mcap(

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow.parquet as pq
 import pytest
 
 from compensation.controller import Controller, Gains
@@ -124,7 +125,14 @@ def test_a_parquet_table_reads_back_bit_for_bit(tmp_path: Path) -> None:
     frame = pd.read_parquet(path)
     assert list(frame.columns) == list(HEADER)
     assert frame["x3"].to_numpy().tolist() == run.state[:, 2].tolist()
-    assert frame.attrs["simulated"] is True
+    schema = pq.read_schema(path)
+    assert schema.metadata[b"simulated"] == b"true"
+    assert [schema.field(name).metadata[b"unit"] for name in ("t", "x1", "v", "u")] == [
+        b"s",
+        b"rad",
+        b"rad/s",
+        b"N m",
+    ]
 
 
 @pytest.mark.parametrize("text", ["1,0", "1,0,0,0", "a,b,c", "1,0,nan", "", "1;0;0"])

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import math
-from pathlib import Path
+import re
+from pathlib import Path, PurePath
 
 import numpy as np
 import pytest
@@ -198,6 +199,29 @@ def test_awkward_names_units_and_axes_read_back_as_meant(tmp_path: Path) -> None
     assert forward.reference is not None
     assert forward.velocity.mean() == pytest.approx(0.005, rel=1e-3)
     assert np.abs(forward.reference - forward.position).max() < 1e-4
+
+
+def test_parquet_logs_are_recorded_and_read_back_bit_for_bit(tmp_path: Path) -> None:
+    """What is written as CSV keeps 12 decimals, as MCAP whole nanoseconds; Parquet keeps everything."""
+    plain = AWKWARD.replace('{ csv = "zeit", unit = { csv = "ms" } }', '{ csv = "t", parquet = "t" }')
+    plain = re.sub(r"(?m)^(position|torque) = .*", r'\1 = { csv = "\1", parquet = "\1" }', plain)
+    texts = {kind: plain.replace('"v/a*.mcap", "v/b*.csv"', f'"v/*.{kind}"') for kind in ("csv", "parquet")}
+    runs = {}
+    for kind, text in texts.items():
+        folder = tmp_path / kind
+        folder.mkdir()
+        campaign = campaign_in(folder, text.replace('"e/*.csv"', f'"e/*.{kind}"'))
+        record(campaign, folder)
+        runs[kind] = recordings(campaign)
+    assert {PurePath(log).suffix for log in runs["parquet"]} == {".parquet"}
+    for log, run in runs["parquet"].items():
+        other = runs["csv"][log.replace(".parquet", ".csv")]
+        assert run.simulated
+        np.testing.assert_array_equal(run.time, 1e-3 * np.arange(run.time.size))
+        np.testing.assert_allclose(run.position, other.position, rtol=0, atol=6e-13)
+        np.testing.assert_allclose(run.torque, other.torque, rtol=0, atol=6e-13)
+        counts = run.position * 1e6
+        np.testing.assert_array_equal(run.position, np.rint(counts) * 1e-6)  # as the encoder gave them
 
 
 def test_a_fast_link_on_a_fine_encoder_is_read_without_findings(tmp_path: Path) -> None:
