@@ -292,6 +292,7 @@ def compare(
     law: option.Law = "per-direction",
     compensator: option.Compensator = None,
     salvage: option.Salvage = False,
+    predicted_logs: option.PredictedLogs = False,
     jobs: option.Jobs = None,
     seed: option.Seed = 0,
     quiet: option.Quiet = False,
@@ -307,7 +308,10 @@ def compare(
 
     loaded, source = load_campaign(campaign), read_robot(robot)
     folder = open_results(_place(out, loaded.owner), loaded.owner, force=force)
-    options = RunOptions(salvage=salvage, law=law, compensator=compensator, seed=seed, jobs=jobs)
+    options = RunOptions(
+        salvage=salvage, law=law, compensator=compensator, seed=seed, jobs=jobs,
+        predicted_logs=predicted_logs,
+    )  # fmt: skip
     with shown_progress(quiet=quiet) as progress:
         missing = compare_campaign(loaded, source, folder, options, progress=progress)
     document = _document(folder, "comparison.json")
@@ -330,6 +334,7 @@ def run(
     one_law: option.OneLaw = False,
     per_direction: option.PerDirection = False,
     salvage: option.Salvage = False,
+    predicted_logs: option.PredictedLogs = False,
     over: option.Over = None,
     law: option.Law = "per-direction",
     compensator: option.Compensator = None,
@@ -361,6 +366,7 @@ def run(
         over=tuple(over or ()),
         seed=seed,
         jobs=jobs,
+        predicted_logs=predicted_logs,
     )
     with shown_progress(quiet=quiet) as progress:
         missing = run_campaign(loaded, folder, options, command="run", progress=progress)

@@ -20,7 +20,7 @@ from data.findings import Severity
 from data.recording import Recording
 from ident.estimate import IdentifiedRobot
 from ident.fit.assumptions import DEFAULT, Assumptions
-from pipelines.compare import compare, write_comparison, write_figure10
+from pipelines.compare import Comparison, compare, write_comparison, write_figure10
 from pipelines.design import design, write_design
 from pipelines.executors.processes import opened_map
 from pipelines.executors.threads import opened_threads
@@ -28,6 +28,7 @@ from pipelines.exit_status import Status, UsageError
 from pipelines.identify import identify, left_out, write_identification
 from pipelines.motion_figures import write_motion_figures
 from pipelines.predict import Sweep, one_sweep
+from pipelines.predicted_logs import write_predicted_logs
 from pipelines.progress import Progress
 from pipelines.recordings import IDENTIFYING, ReadLogs, SetPointLogs, SetPointRun, read_logs, set_point_logs
 from pipelines.report.page import report_page
@@ -44,6 +45,7 @@ from pipelines.settings.gains import (
     with_exact,
 )
 from pipelines.settings.loop import LawChoice
+from pipelines.viewer_layout import write_layout
 
 PICTURES = ("figure2", "validation", "figure4", "figure6", "figure7", "figure8", "figure9", "figure10")
 SWEEP_POINTS = 101
@@ -62,6 +64,7 @@ class RunOptions:
     over: tuple[str, ...] = ()
     seed: int = 0
     jobs: int | None = None
+    predicted_logs: bool = False
 
     def shown(self) -> dict[str, object]:
         """As the manifest remembers them; they hold no path."""
@@ -74,6 +77,7 @@ class RunOptions:
             "law": self.law,
             "compensator": self.compensator,
             "over": list(self.over),
+            "predicted_logs": self.predicted_logs,
             **{name: value for name, value in said.items() if value is not None},
         }
 
@@ -261,7 +265,22 @@ def _answer_for_runs(
         )
     write_comparison(folder, found)
     write_figure10(folder, found, axis=campaign.rig.axis)
+    if options.predicted_logs:
+        _write_logs(campaign, folder, found)
     return [*found.withheld, *salvaged(run.recording for run in logs.runs)]
+
+
+def _write_logs(campaign: Campaign, folder: ResultFolder, found: Comparison) -> None:
+    """The predicted runs as logs, and the layout that lays them over the recordings."""
+    if write_predicted_logs(folder, [run.judged for run in found.runs], robot=found.robot):
+        named = [
+            signals
+            for experiment in campaign.experiments
+            if experiment.protocol == "set_point"
+            for signals in (experiment.signals.mcap, experiment.signals.bag)
+            if signals is not None
+        ]
+        write_layout(folder, named, rig=campaign.rig)
 
 
 def swept(options: RunOptions, runs: tuple[SetPointRun, ...]) -> Sweep:

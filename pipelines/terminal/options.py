@@ -35,6 +35,14 @@ Jobs = Annotated[
 ]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Of everything that is drawn at random.")]
 Salvage = Annotated[bool, typer.Option("--salvage", help="Go on with what a damaged log still holds.")]
+PredictedLogs = Annotated[
+    bool,
+    typer.Option(
+        "--predicted-logs",
+        help="Write each predicted set-point run as MCAP, and a Foxglove layout, to view them.",
+        rich_help_panel=_OUTPUT,
+    ),
+]
 Over = Annotated[
     list[str] | None,
     typer.Option("--over", help="What to sweep: r=0.8:1.2:200 or L=20:120:101.", show_default=False),
