@@ -14,8 +14,9 @@ import numpy as np
 from data.bag.reader import Bag, opened
 from data.findings import LogError
 from data.integrity import Integrity
-from data.mcap.columns import McapColumns, Topic, header_stamp
+from data.mcap.columns import McapColumns, Topic
 from data.mcap.field_path import FieldPath, resolve, resolve_exactly
+from data.mcap.stamp import header_stamp
 from data.names import nearest, shown
 
 _NO_STAMP = np.iinfo(np.int64).min
