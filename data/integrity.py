@@ -10,9 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from data.findings import Finding, LogError, Severity
 
 _MOST_NAMED: Final = 8  # losses in one sentence
+_MOST_SPANS: Final = 4  # stretches of time in one sentence
+_DISORDER: Final = 10**9  # [ns] by which a recorder may write messages out of order
 Checksums = Literal["verified", "absent", "failed"]
 
 
@@ -23,19 +28,27 @@ class Loss:
     begin: int  # first byte
     end: int  # one past the last byte
     why: str
-    time_range: tuple[int, int] | None = None  # [ns] log times, where the file tells them
-    behind: int | None = None  # [ns] the latest log time read before it, where it has no times of its own
+    time_range: tuple[int, int] | None = None  # [ns] its own log times, where the file tells them
+    before: int | None = None  # [ns] the latest log time read before it
+    behind: int | None = None  # [ns] the earliest one read next behind it
 
     @property
     def text(self) -> str:
         """One clause: the bytes, the time where known, and why."""
-        when = ""
+        where = f"bytes {self.begin} to {self.end}" if self.end > self.begin else f"byte {self.begin}"
+        return f"{where}{self._when}: {self.why}"
+
+    @property
+    def _when(self) -> str:
         if self.time_range is not None:
-            first, last = self.time_range
-            when = f", log time {first * 1e-9:.3f} to {last * 1e-9:.3f} s"
-        elif self.behind is not None:
-            when = f", behind log time {self.behind * 1e-9:.3f} s"
-        return f"bytes {self.begin} to {self.end}{when}: {self.why}"
+            return f", log time {_seconds(self.time_range[0])} to {_seconds(self.time_range[1])} s"
+        if self.before is not None and self.behind is not None:
+            return f", between log times {_seconds(self.before)} and {_seconds(self.behind)} s"
+        if self.before is not None:
+            return f", behind log time {_seconds(self.before)} s"
+        if self.behind is not None:
+            return f", before log time {_seconds(self.behind)} s"
+        return ""
 
 
 @dataclass(frozen=True)
@@ -49,6 +62,8 @@ class Integrity:
     time_range: tuple[int, int] | None = None  # [ns] of the readable messages
     notes: tuple[str, ...] = ()  # oddities that cost nothing
     counted: str = "messages"  # what `messages` are called: rows in a table
+    promised: int | None = None  # messages, by the file's own count
+    unproved: int = 0  # readable messages that no checksum vouches for
 
     @property
     def whole(self) -> bool:
@@ -56,17 +71,82 @@ class Integrity:
         return not self.losses
 
     @property
+    def gaps(self) -> tuple[tuple[int, int], ...]:
+        """Log times [ns] between which something is lost, in order, those that overlap as one."""
+        merged: list[tuple[int, int]] = []
+        known = [(loss.before, loss.behind) for loss in self.losses]
+        ordered = sorted((a, b) for a, b in known if a is not None and b is not None and a < b)
+        for before, behind in ordered:
+            if merged and before < merged[-1][1]:
+                merged[-1] = (merged[-1][0], max(behind, merged[-1][1]))
+            else:
+                merged.append((before, behind))
+        return tuple(merged)
+
+    @property
+    def kept(self) -> tuple[tuple[int, int], ...]:
+        """The stretches of log time [ns] of which nothing is known to be lost, in order."""
+        if self.time_range is None:
+            return ()
+        first, last = self.time_range
+        begins = [first, *(behind for _, behind in self.gaps)]
+        ends = [*(before for before, _ in self.gaps), last]
+        return tuple((begin, end) for begin, end in zip(begins, ends, strict=True) if begin <= end)
+
+    def breaks(self, log_time: NDArray[np.int64]) -> tuple[int, ...]:
+        """Before which of a topic's messages (n,) something of the file is lost.
+
+        Nothing may be interpolated between such a message and the one before it.
+
+        Parameters
+        ----------
+        log_time
+            (n,) [ns], in the order of the file.
+
+        Returns
+        -------
+        tuple of int
+            Ascending, each from 1 to n - 1. Where the recorder's order leaves it open between which two
+            messages the loss lies, all that it may be are given.
+        """
+        places: set[int] = set()
+        latest = np.maximum.accumulate(log_time)
+        for loss in self.losses:
+            if loss.before is None or loss.behind is None:
+                continue
+            last = int(np.searchsorted(latest, loss.before, "right"))
+            first = last
+            if loss.before - _DISORDER <= loss.behind <= loss.before:
+                first = int(np.searchsorted(latest, loss.behind, "left"))
+            places.update(range(first, last + 1))
+        return tuple(sorted(place for place in places if 0 < place < log_time.size))
+
+    @property
     def left(self) -> str:
         """What a salvage keeps, as a clause."""
         if not self.messages:
             return "nothing"
-        parts = f"{self.messages} {self.counted}"
+        parts = f"{self.messages} "
+        if self.promised is not None and self.promised > self.messages:
+            parts += f"of {self.promised} "
+        parts += self.counted
         if self.chunks:
             parts += f" in {self.chunks} intact chunk" + "s" * (self.chunks != 1)
-        if self.time_range is not None:
-            first, last = self.time_range
-            parts += f", {(last - first) * 1e-9:.3f} s of log time from {first * 1e-9:.3f} s"
-        return parts
+        if self.unproved:
+            whose = "" if self.unproved == self.messages else f"{self.unproved} of them "
+            parts += f" ({whose}without a checksum)"
+        return parts + self._time_left()
+
+    def _time_left(self) -> str:
+        if self.time_range is None:
+            return ""
+        first, last = self.time_range
+        if not self.gaps:
+            return f", {_seconds(last - first)} s of log time from {_seconds(first)} s"
+        total = sum(end - begin for begin, end in self.kept)
+        spans = [f"{_seconds(begin)} to {_seconds(end)}" for begin, end in self.kept[:_MOST_SPANS]]
+        more = f" and {len(self.kept) - _MOST_SPANS} more stretches" if len(self.kept) > _MOST_SPANS else ""
+        return f", {_seconds(total)} of {_seconds(last - first)} s of log time: {', '.join(spans)} s{more}"
 
     def require(self, log: str, *, salvage: bool) -> tuple[Finding, ...]:
         """What is to be said of the file: its oddities, and what is lost if the user goes on with the rest.
@@ -93,3 +173,7 @@ class Integrity:
             lost += f"; and {len(self.losses) - _MOST_NAMED} more places"
         text = f"salvaged: lost {lost}. Kept {self.left}; no estimate uses what is lost"
         return (Finding("E-DAMAGE", Severity.WITHHOLD, text, log), *noted)
+
+
+def _seconds(nanoseconds: int) -> str:
+    return f"{nanoseconds * 1e-9:.3f}"

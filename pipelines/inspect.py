@@ -121,6 +121,7 @@ def _mcap(content: McapDescription) -> dict[str, Any]:
         "chunks": dict(content.compressions),
         "indexed": content.indexed,
         "channels": [_with_rates(asdict(channel)) for channel in content.channels],
+        "channels_not_listed": content.unlisted,
         "empty_topics": list(content.empty_topics),
         "attachments": [asdict(label) for label in content.attachments],
     }
@@ -155,12 +156,17 @@ def _integrity(found: Integrity) -> dict[str, Any]:
         "whole": found.whole,
         "chunks": found.chunks,
         "messages": found.messages,
+        "promised": found.promised,
+        "unproved": found.unproved,
+        "kept": [[begin * 1e-9, end * 1e-9] for begin, end in found.kept],
         "lost": [
             {
                 "begin": loss.begin,
                 "end": loss.end,
                 "why": loss.why,
                 "log_time": None if loss.time_range is None else [t * 1e-9 for t in loss.time_range],
+                "before": None if loss.before is None else loss.before * 1e-9,
+                "behind": None if loss.behind is None else loss.behind * 1e-9,
             }
             for loss in found.losses
         ],

@@ -6,8 +6,9 @@ are read for all messages where a layout can be proved, which costs next to noth
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -18,12 +19,14 @@ from data.clocks import ClockReport, clock_report_ns
 from data.findings import LogError
 from data.integrity import Integrity
 from data.mcap import joint_state
+from data.mcap.attachments import AttachmentLabel
 from data.mcap.columns import run_metadata
 from data.mcap.decoding import decoder
 from data.mcap.field_path import leaves
 from data.mcap.records import ByteArray, gather
-from data.mcap.walk import AttachmentLabel, Block, McapWalk
+from data.mcap.walk import Block, McapWalk
 
+MOST_LISTED: Final = 500  # channels
 _MOST_FIELDS: Final = 200
 
 
@@ -60,6 +63,7 @@ class McapDescription:
     compressions: Mapping[str, int]  # chunks by compression
     indexed: bool
     channels: tuple[ChannelDescription, ...]
+    unlisted: int  # further channels with messages
     empty_topics: tuple[str, ...]  # declared, without a message
     metadata: Mapping[str, str]
     attachments: tuple[AttachmentLabel, ...]
@@ -82,16 +86,20 @@ def describe(content: ByteArray) -> McapDescription:
     """Describe a file's bytes. Damage is no error here: see its `integrity`."""
     walk = McapWalk(content)
     seen: dict[int, _Seen] = {}
+    found = np.zeros(1 << 16, np.bool_)
     for block in walk.blocks():
-        for number in np.unique(block.messages.channel).tolist():
-            _take(walk, block, number, seen)
-    topics = {part.channel.topic for part in seen.values()}
+        for number, mine in _by_channel(block.messages.channel):
+            found[number] = True
+            if number in seen or len(seen) < MOST_LISTED:
+                _take(walk, block, number, mine, seen)
+    topics = {channel.topic for number, channel in walk.channels.items() if found[number]}
     return McapDescription(
         profile=walk.header.profile,
         library=walk.header.library,
         compressions=walk.compressions,
         indexed=walk.indexed,
         channels=tuple(_channel(part) for part in seen.values()),
+        unlisted=int(found.sum()) - len(seen),
         empty_topics=tuple(c.topic for c in walk.channels.values() if c.topic not in topics),
         metadata=run_metadata(walk),
         attachments=tuple(walk.attachments),
@@ -99,9 +107,17 @@ def describe(content: ByteArray) -> McapDescription:
     )
 
 
-def _take(walk: McapWalk, block: Block, number: int, seen: dict[int, _Seen]) -> None:
+def _by_channel(channel: NDArray[np.uint16]) -> Iterator[tuple[int, NDArray[np.intp]]]:
+    """Each channel among messages (n,), and which of them are its own, in order."""
+    order = np.argsort(channel, kind="stable")
+    ordered = channel[order]
+    begins = np.flatnonzero(np.diff(ordered, prepend=-1))
+    for begin, end in pairwise((*begins.tolist(), channel.size)):
+        yield int(ordered[begin]), order[begin:end]
+
+
+def _take(walk: McapWalk, block: Block, number: int, mine: NDArray[np.intp], seen: dict[int, _Seen]) -> None:
     found = block.messages
-    mine = np.flatnonzero(found.channel == number)
     begin, length = found.begin[mine], found.length[mine]
     if number not in seen:
         channel = walk.channels[number]

@@ -4,7 +4,10 @@ The summary at the end of a file says where things are, and is neither complete 
 damaged ones. This walk goes through the records in order instead, unpacks each chunk, and hands on blocks of
 messages as bytes with the places of their records; schemas, channels, metadata and attachments are collected
 on the way. Checksums are always compared. What cannot be read becomes a `Loss` and the walk goes on at the
-next place that can be proved to be a chunk; whether a loss is acceptable is the caller's question.
+next place that can be proved to be a record; whether a loss is acceptable is the caller's question.
+
+A record whose length was damaged still looks like one, and swallows those behind it. So a record is believed
+only where another follows it, or where its own lengths add up.
 
 Source: https://mcap.dev/spec (version 0).
 """
@@ -12,30 +15,39 @@ Source: https://mcap.dev/spec (version 0).
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, DataEnd, Footer, Header, Metadata, Schema, Statistics
+from mcap.records import Channel, Footer, Header, Metadata, Schema, Statistics
 
-from data.integrity import Checksums, Integrity, Loss
-from data.mcap.chunks import unpack
+from data.integrity import Integrity, Loss
+from data.mcap.attachments import AttachmentLabel, read_attachment
+from data.mcap.chunks import extent, read_head, unpack
 from data.mcap.container import MAGIC
-from data.mcap.records import HEADER, ByteArray, Damage, Messages, Tiling, look, messages, parse, tile
-from data.mcap.resync import chunk_extent, next_chunk, summary_declarations
+from data.mcap.credible import Surroundings, follows, message_begins, surroundings
+from data.mcap.declarations import Declarations
+from data.mcap.fields import Fields, read_metadata
+from data.mcap.limits import METADATA_BYTES, MOST_ATTACHMENTS, MOST_METADATA
+from data.mcap.proofs import Proofs
+from data.mcap.readable import BLOCK_OPCODES, Dropped, readable, refused
+from data.mcap.records import HEADER, MESSAGE_PREFIX, ByteArray, Damage, Messages, Tiling, look, parse, tile
+from data.mcap.resync import Seeker, disguised, exact, summary_declarations
 
-_LOOSE: Final = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL), int(Opcode.MESSAGE)})
+_HINTS: Final = (
+    Opcode.MESSAGE_INDEX,
+    Opcode.CHUNK_INDEX,
+    Opcode.ATTACHMENT_INDEX,
+    Opcode.METADATA_INDEX,
+    Opcode.SUMMARY_OFFSET,
+)
+_PASSED: Final = frozenset({*map(int, _HINTS), *range(16, 256)})  # not needed here, or not known
 _LARGE: Final = 4 << 20  # [bytes]
-_MOST_LOSSES: Final = 1000  # after which the rest of a file is given up
-_READERS: Final[dict[int, Callable[[ReadDataStream], Any]]] = {
-    Opcode.HEADER: Header.read,
-    Opcode.METADATA: Metadata.read,
-    Opcode.STATISTICS: Statistics.read,
-    Opcode.DATA_END: DataEnd.read,
-}
+_LONGEST_STATISTICS: Final = 46 + 10 * (1 << 16)  # [bytes]
+_SMALLEST_DISGUISED: Final = MESSAGE_PREFIX  # [bytes]
+_MOST_DISGUISED: Final = 10_000  # of a stretch that are looked through
 
 
 @dataclass(frozen=True)
@@ -47,17 +59,6 @@ class Block:
     messages: Messages
 
 
-@dataclass(frozen=True)
-class AttachmentLabel:
-    """An attachment's label; its content stays in the file."""
-
-    name: str
-    media_type: str
-    size: int  # [bytes]
-    log_time: int  # [ns]
-    create_time: int  # [ns]
-
-
 class McapWalk:
     """One walk through the bytes of one file: iterate `blocks` to the end, then read the rest.
 
@@ -65,8 +66,6 @@ class McapWalk:
     """
 
     def __init__(self, content: ByteArray) -> None:
-        self.schemas: dict[int, Schema] = {}
-        self.channels: dict[int, Channel] = {}
         self.metadata: list[Metadata] = []
         self.attachments: list[AttachmentLabel] = []
         self.header = Header(profile="", library="")
@@ -74,189 +73,269 @@ class McapWalk:
         self.indexed = False  # whether a summary stands at the end
         self.large = content.size > _LARGE  # worth compiled code
         self._content = content
-        self._statistics: Statistics | None = None
-        self._losses: list[Loss] = []
-        self._notes: list[str] = []
-        self._vouched = [0, 0]  # stretches of messages without a checksum, and with one
+        self._declared = Declarations()
+        self._seeker = Seeker(content)
+        self._proofs = Proofs()
+        self._statistics: bytes | None = None
         self._unpacked = 0
-        self._chunks = 0
-        self._messages = 0
-        self._times: tuple[int, int] | None = None
+        self._entries = 0  # of metadata
+        self._metadata_bytes = 0
+        self._loose = False  # whether messages stand outside chunks
+        self._chunked = False  # whether there are chunks
         self._summary_read = False
         self._data_ended = False
+        self._suspect = -1  # the record that ends where no other follows
+
+    @property
+    def schemas(self) -> dict[int, Schema]:
+        """By number, as far as the walk has come."""
+        return self._declared.schemas
+
+    @property
+    def channels(self) -> dict[int, Channel]:
+        """By number, as far as the walk has come, without their metadata."""
+        return self._declared.channels
+
+    @property
+    def statistics(self) -> Statistics | None:
+        """What the file says of itself, if it does."""
+        return (
+            parse(Statistics.read, self._statistics, where=0, name="statistics") if self._statistics else None
+        )
 
     @property
     def integrity(self) -> Integrity:
         """What is proved, once `blocks` has been exhausted."""
-        without, with_one = self._vouched
-        checksums: Checksums = "verified" if with_one and not without else "absent"
-        return Integrity(
-            checksums="failed" if self._losses else checksums,
-            losses=tuple(self._losses),
-            chunks=self._chunks,
-            messages=self._messages,
-            time_range=self._times,
-            notes=tuple(self._notes),
-        )
+        return self._proofs.integrity
 
     def blocks(self) -> Iterator[Block]:
         """The file's messages, block by block, in the order of the file."""
         size = self._content.size
-        if self._content[: len(MAGIC)].tobytes() != MAGIC:
-            self._losses.append(Loss(0, size, "it does not begin as an MCAP file does"))
-            return
-        here, ended = len(MAGIC), False
+        here, ended = self._begin(), False
         while here < size and not ended:
+            if self._proofs.full:
+                self._proofs.lose(here, size, "so much before it is damaged that the rest is given up")
+                break
             try:
                 block, here, ended = self._step(here)
             except Damage as damage:
                 here = self._lose(here, damage)
                 continue
             if block is not None:
-                self._count(block.messages)
                 yield block
-        if not ended and not (self._losses and self._losses[-1].end == size):
-            why = "it stops there: the recording was cut off"
-            self._losses.append(Loss(size, size, why, behind=self._latest()))
-        promised = self._statistics.message_count if self._statistics else self._messages
-        if promised != self._messages and not self._losses:
-            why = f"the statistics promise {promised} messages, {self._messages} were found"
-            self._losses.append(Loss(0, size, why))
+        if not ended and not self._proofs.lost_to(size):
+            self._proofs.lose(size, size, "it stops there: the recording was cut off")
+        self._compare_statistics()
+
+    def _begin(self) -> int:
+        """Where the first record stands."""
+        content, begin = self._content, len(MAGIC)
+        if content[:begin].tobytes() == MAGIC:
+            return begin
+        why = "it does not begin as an MCAP file does"
+        ends_well = content.size > 2 * begin and content[-begin:].tobytes() == MAGIC
+        headed = content[begin : begin + 1].tobytes() == bytes([Opcode.HEADER]) and self._headed(begin)
+        end = begin if ends_well or headed else content.size
+        self._proofs.lose(0, end, why)
+        return end
+
+    def _headed(self, here: int) -> bool:
+        why, opcode, length = look(self._content.data, here, self._content.size)
+        begin = here + HEADER.size
+        return not why and exact(self._content, opcode, begin, begin + length)
 
     def _step(self, here: int) -> tuple[Block | None, int, bool]:
         """Read what stands at `here`: its messages if any, where to go on, whether this was the end."""
+        if here == self._suspect:
+            raise Damage(here, "a record claims to end where no other follows")
         why, opcode, length = look(self._content.data, here, self._content.size)
-        if why:
-            raise Damage(here, why)
         begin = here + HEADER.size
         end = begin + length
-        if opcode in _LOOSE:
-            tiling = tile(self._content, begin=here, within=_LOOSE, large=self.large)
-            try:
-                block = self._block(self._content, tiling, where=here)
-            except Damage as damage:
-                raise Damage(here, damage.why, resume=tiling.end) from damage
-            self._vouched[0] += block is not None
-            return block, tiling.end, False
-        if opcode == Opcode.CHUNK:
-            return self._chunk(begin, end), end, False
+        if opcode == Opcode.CHUNK:  # its data have a length of their own
+            return *self._chunk(here, end), False
+        if why:
+            raise Damage(here, why)
+        if opcode in BLOCK_OPCODES:
+            return *self._stretch(here), False
+        if opcode in _PASSED:
+            return None, self._pass_over(here), False
         if opcode == Opcode.FOOTER:
             self._footer(begin, end)
             return None, end, True
-        if opcode == Opcode.ATTACHMENT:
-            self._attachment(begin, end)
-        elif opcode in _READERS:
-            self._record(opcode, begin, end)
-        return None, end, False  # indexes are hints not needed here; unknown records are to be passed over
-
-    def _chunk(self, begin: int, end: int) -> Block | None:
-        chunk = parse(Chunk.read, self._content[begin:end].tobytes(), where=begin, name="chunk")
-        content = unpack(chunk, where=begin, unpacked_before=self._unpacked, file_size=self._content.size)
-        self._unpacked += chunk.uncompressed_size
         try:
-            found = self._block(content.block, tile(content.block, large=self.large), where=begin)
+            self._record(opcode, begin, end)
         except Damage as damage:
-            raise Damage(begin, f"inside a chunk, {damage.why}", resume=end) from damage
-        self._chunks += 1
-        self._vouched[content.checked] += 1
-        name = chunk.compression or "none"
+            raise Damage(here, damage.why, resume=self._if_followed(end)) from damage
+        return None, end, False
+
+    def _chunk(self, here: int, stated: int) -> tuple[Block | None, int]:
+        """The messages of the chunk at `here` whose record claims to end at `stated`, and where to go on."""
+        content, begin = self._content, here + HEADER.size
+        resume = self._if_followed(stated)
+        self._chunked = True
+        try:
+            head = read_head(content, begin, content.size)
+            longer = head.end < stated and resume is not None and self._if_followed(head.end) is None
+            agree = head.end == stated or longer  # a record may have fields that are not known yet
+            end = stated if agree else head.end
+            if agree and head.credible:
+                resume = end
+            block = unpack(content, head, unpacked_before=self._unpacked)
+            self._unpacked += head.unpacked_size
+            if not agree and not head.checksum:
+                raise Damage(begin, "a chunk's two lengths differ, and no checksum tells which is right")
+        except Damage as damage:
+            raise Damage(begin, damage.why, resume=resume) from damage
+        try:
+            tiling = tile(block, large=self.large)
+            dropped = [refused(tiling, *one) for one in self._declared.take(block, tiling)]
+            found = self._block(block, tiling, dropped, record=(here, end), checked=head.checksum != 0)
+        except Damage as damage:
+            raise Damage(begin, f"inside a chunk, {damage.why}", resume=resume) from damage
+        if not agree:
+            why = "the length of a chunk's record is wrong; its content is whole by its checksum"
+            self._proofs.lose(here, begin, why, gap=False)
+        self._proofs.chunks += 1
+        name = head.compression or "none"
         self.compressions[name] = self.compressions.get(name, 0) + 1
-        return found
+        return found, end
 
-    def _block(self, data: ByteArray, tiling: Tiling, *, where: int) -> Block | None:
-        """Take in a block's schemas and channels; its messages, if it has any."""
-        for k in np.flatnonzero((tiling.opcode == Opcode.SCHEMA) | (tiling.opcode == Opcode.CHANNEL)):
-            begin = int(tiling.begin[k])
-            content = data[begin : begin + int(tiling.length[k])].tobytes()
-            if tiling.opcode[k] == Opcode.SCHEMA:
-                self._declare(self.schemas, parse(Schema.read, content, where=where, name="schema"), where)
-            else:
-                self._declare(self.channels, parse(Channel.read, content, where=where, name="channel"), where)
-        found = messages(data, tiling)
-        if not found.channel.size:
-            return None
-        for number in np.unique(found.channel).tolist():
-            self._require(number, where)
-        return Block(where, data, found)
+    def _stretch(self, here: int) -> tuple[Block | None, int]:
+        """The messages that stand outside chunks from `here` on, and where to go on."""
+        content = self._content
+        tiling = tile(content, begin=here, within=BLOCK_OPCODES, large=self.large)
+        last = int(tiling.begin[-1]) - HEADER.size
+        opcode = int(tiling.opcode[-1])
+        own = opcode != Opcode.MESSAGE and exact(content, opcode, last + HEADER.size, tiling.end)
+        listed = [refused(tiling, *one) for one in self._declared.take(content, tiling)]
+        if not own and not follows(content, tiling.end, self._near()):
+            self._suspect = last
+            tiling = Tiling(tiling.opcode[:-1], tiling.begin[:-1], tiling.length[:-1], last)
+        if not tiling.opcode.size:
+            return None, last
+        self._loose |= bool(np.any(tiling.opcode == Opcode.MESSAGE))
+        try:
+            block = self._block(content, tiling, listed, record=None, checked=False)
+        except Damage as damage:
+            raise Damage(here, damage.why, resume=tiling.end) from damage
+        return block, tiling.end
 
-    @staticmethod
-    def _declare(known: dict[int, Any], record: Schema | Channel, where: int) -> None:
-        if known.setdefault(record.id, record) != record:
-            kind = type(record).__name__.lower()
-            raise Damage(where, f"{kind} {record.id} is declared twice, differently")
+    def _near(self) -> Surroundings:
+        """What a message must be like to be believed, as far as the walk has come."""
+        return surroundings(self._declared.declared, self._proofs.log, self._proofs.publish)
 
-    def _require(self, number: int, where: int) -> None:
-        """A channel with messages must have been declared, and its schema; the summary may stand in."""
-        if not self._declared(number) and not self._summary_read:
-            schemas, channels = summary_declarations(self._content)
-            self.schemas = schemas | self.schemas
-            self.channels = channels | self.channels
+    def _block(
+        self,
+        data: ByteArray,
+        tiling: Tiling,
+        dropped: list[Dropped],
+        *,
+        record: tuple[int, int] | None,
+        checked: bool,
+    ) -> Block | None:
+        """A block's messages, if it has any. `record`: the chunk that it was in."""
+        found, lost = readable(data, tiling, dropped, self._declared, self._read_summary)
+        losses = [(_loss(one, record), one.gap) for one in lost]
+        self._proofs.count(found, losses, checked=checked)
+        where = record[0] if record else int(tiling.begin[0]) - HEADER.size
+        return Block(where, data, found) if found.channel.size else None
+
+    def _read_summary(self) -> None:
+        """Let the summary stand in for declarations that are missing."""
+        if not self._summary_read:
             self._summary_read = True
-        if not self._declared(number):
-            raise Damage(where, f"messages on channel {number}, which is nowhere declared with its schema")
+            self._declared.stand_in(*summary_declarations(self._content))
 
-    def _declared(self, number: int) -> bool:
-        channel = self.channels.get(number)
-        return channel is not None and (channel.schema_id == 0 or channel.schema_id in self.schemas)
+    def _pass_over(self, here: int) -> int:
+        """Pass over indexes, and records of unknown opcodes; where to go on."""
+        content = self._content
+        tiling = tile(content, begin=here, within=_PASSED, large=self.large)
+        near = self._near()
+        starts = tiling.begin - HEADER.size
+        large = np.flatnonzero(tiling.length >= _SMALLEST_DISGUISED)[:_MOST_DISGUISED]
+        for k in large.tolist():
+            begin, end = int(tiling.begin[k]), int(tiling.begin[k] + tiling.length[k])
+            hidden = self._loose and message_begins(content, int(starts[k]), near)
+            if hidden or disguised(content, begin, end):
+                if k:
+                    return int(starts[k])
+                kind = "message" if hidden else "chunk"
+                why = f"a {kind} stands there as a record of opcode {int(tiling.opcode[0])}"
+                raise Damage(here, why, resume=self._if_followed(end))
+        begin = int(tiling.begin[-1])
+        if exact(content, int(tiling.opcode[-1]), begin, tiling.end) or follows(content, tiling.end, near):
+            return tiling.end
+        self._suspect = begin - HEADER.size
+        return self._suspect
 
     def _record(self, opcode: int, begin: int, end: int) -> None:
-        content = self._content[begin:end].tobytes()
-        record = parse(_READERS[opcode], content, where=begin, name=Opcode(opcode).name.lower())
-        if isinstance(record, Header):
-            self.header = record
-        elif isinstance(record, Metadata):
-            self.metadata.append(record)
-        elif isinstance(record, Statistics):
-            self._statistics = record
-        elif isinstance(record, DataEnd):
-            self._end_data(record, begin, end)
+        content = self._content[begin:end]
+        name = Opcode(opcode).name.lower()
+        if opcode == Opcode.METADATA:
+            self._take_metadata(begin, end)
+            return
+        if not exact(self._content, opcode, begin, end) and self._if_followed(end) is None:
+            raise Damage(begin, f"a {name} record whose lengths do not add up")
+        if opcode == Opcode.HEADER:
+            fields = Fields(content.data, where=begin, record=name)
+            self.header = Header(profile=fields.text(), library=fields.text())
+            if begin != len(MAGIC) + HEADER.size:
+                raise Damage(begin, "a header record that is not the first")
+        elif opcode == Opcode.STATISTICS:
+            if content.size > _LONGEST_STATISTICS:
+                raise Damage(begin, f"statistics of {content.size} bytes")
+            self._statistics = content.tobytes()
+            self._proofs.promised = Fields(content.data, where=begin, record=name).number(8)
+        elif opcode == Opcode.DATA_END:
+            self._end_data(int.from_bytes(content[:4].tobytes(), "little"), begin)
+        elif opcode == Opcode.ATTACHMENT:
+            if len(self.attachments) >= MOST_ATTACHMENTS:
+                raise Damage(begin, f"more than {MOST_ATTACHMENTS} attachments")
+            self.attachments.append(read_attachment(self._content, begin, end))
 
-    def _end_data(self, record: DataEnd, begin: int, end: int) -> None:
+    def _take_metadata(self, begin: int, end: int) -> None:
+        self._metadata_bytes += end - begin
+        if self._metadata_bytes > METADATA_BYTES:
+            raise Damage(begin, f"more than {METADATA_BYTES} bytes of metadata")
+        most = MOST_METADATA - self._entries
+        found, used = read_metadata(self._content[begin:end].data, where=begin, most=most)
+        if used != end - begin and self._if_followed(end) is None:
+            raise Damage(begin, "a metadata record whose lengths do not add up")
+        self._entries += 1 + len(found.metadata)
+        self.metadata.append(found)
+
+    def _end_data(self, checksum: int, begin: int) -> None:
         """Check the checksum of all that came before, where there is one."""
         self._data_ended = True
-        if record.data_section_crc and not self._losses:
+        if checksum and self._proofs.whole:
             before = begin - HEADER.size
-            if zlib.crc32(self._content[:before].data) == record.data_section_crc:
-                self._vouched = [0, 1]  # for everything that came before
+            if zlib.crc32(self._content[:before].data) == checksum:
+                self._proofs.prove_all()
             else:
-                raise Damage(0, "the data section's checksum differs from its content", resume=end)
-
-    def _attachment(self, begin: int, end: int) -> None:
-        """Check an attachment and keep its label, without copying its content."""
-        head = self._content[begin : min(end, begin + (1 << 16))].tobytes()
-
-        def label(stream: ReadDataStream) -> tuple[AttachmentLabel, int]:
-            log_time, create_time = stream.read8(), stream.read8()
-            name, media_type = stream.read_prefixed_string(), stream.read_prefixed_string()
-            size = stream.read8()
-            return AttachmentLabel(name, media_type, size, log_time, create_time), stream.count
-
-        found, offset = parse(label, head, where=begin, name="attachment")
-        checksum = begin + offset + found.size
-        if checksum + 4 > end:
-            raise Damage(begin, f"an attachment claims {found.size} bytes, more than its record", resume=end)
-        stored = int.from_bytes(self._content[checksum : checksum + 4].tobytes(), "little")
-        if stored and zlib.crc32(self._content[begin:checksum].data) != stored:
-            raise Damage(begin, "an attachment's checksum differs from its content", resume=end)
-        self.attachments.append(found)
+                why = (
+                    "the data section's checksum differs from its content: something before it was changed, "
+                    "and only what has a checksum of its own is proved"
+                )
+                self._proofs.lose(before, begin + 4, why, gap=False)
 
     def _footer(self, begin: int, end: int) -> None:
         """Check the summary's checksum and the magic number behind it."""
         size = self._content.size
         footer = parse(Footer.read, self._content[begin:end].tobytes(), where=begin, name="footer")
         self.indexed = footer.summary_start != 0
-        if not self._data_ended and not self._losses:
-            self._losses.append(Loss(0, begin, "the end of the data section is missing"))
+        if not self._data_ended and self._proofs.whole:
+            why = "the end of the data section is not marked; all that stands before it was read"
+            self._proofs.lose(begin - HEADER.size, begin - HEADER.size, why, gap=False)
         start = footer.summary_start or begin - HEADER.size
         if footer.summary_crc and (
             start > begin or zlib.crc32(self._content[start : begin + 16].data) != footer.summary_crc
         ):
             why = "the summary's checksum differs from its content"
-            self._losses.append(Loss(min(start, begin), end, why))
+            self._proofs.lose(min(start, begin), end, why, gap=False)
         if self._content[end : end + len(MAGIC)].tobytes() != MAGIC:
-            self._losses.append(Loss(end, size, "it does not end as an MCAP file does"))
+            self._proofs.lose(end, size, "it does not end as an MCAP file does", gap=False)
         elif size > end + len(MAGIC):
-            self._notes.append(self._behind(end + len(MAGIC)))
+            self._proofs.notes.append(self._behind(end + len(MAGIC)))
 
     def _behind(self, end: int) -> str:
         """What is to be said of bytes behind the end."""
@@ -268,24 +347,33 @@ class McapWalk:
             )
         return f"{rest.size} bytes stand behind the end and are not read"
 
+    def _compare_statistics(self) -> None:
+        """Hold the messages that were found against those that the file promises."""
+        promised, found = self._proofs.promised, self._proofs.messages
+        if promised is not None and promised != found and self._proofs.whole:
+            end = self._content.size
+            why = f"the statistics promise {promised} messages, {found} were found"
+            self._proofs.lose(end, end, f"{why}; where the others belong is not told", gap=False)
+
+    def _if_followed(self, end: int) -> int | None:
+        """Where a record ends, if another follows there."""
+        return end if end <= self._content.size and follows(self._content, end, self._near()) else None
+
     def _lose(self, here: int, damage: Damage) -> int:
         """Note what is lost at `here`; where to go on."""
-        size = self._content.size
-        extent = chunk_extent(self._content, here)
-        after = damage.resume or (extent[0] if extent else None)
-        if after is None and len(self._losses) < _MOST_LOSSES:
-            after = next_chunk(self._content, here + 1)
-        after = size if after is None else after
-        begin = min(here, damage.where) if damage.resume else here
-        self._losses.append(Loss(begin, after, damage.why, extent[1] if extent else None, self._latest()))
-        return after
+        head = extent(self._content, here)
+        after = damage.resume
+        if after is None:
+            self._read_summary()
+            loose = self._loose or not (self._chunked or self._seeker.chunked())
+            after = self._seeker.next_record(here + 1, self._near(), loose=loose)
+        end = self._content.size if after is None else after
+        self._proofs.lose(here, end, damage.why, time_range=head.time_range if head else None)
+        return end
 
-    def _latest(self) -> int | None:
-        """The latest log time so far [ns]."""
-        return self._times[1] if self._times else None
 
-    def _count(self, found: Messages) -> None:
-        first, last = int(found.log_time.min()), int(found.log_time.max())
-        before = self._times or (first, last)
-        self._times = (min(before[0], first), max(before[1], last))
-        self._messages += found.channel.size
+def _loss(one: Dropped, record: tuple[int, int] | None) -> Loss:
+    """A loss of the file, from what was dropped of a stretch or of the chunk record that held it."""
+    begin, end = record or (one.begin, one.end)
+    why = f"inside a chunk, {one.why}" if record else one.why
+    return Loss(begin, end, why, one.time_range, one.before, one.behind)

@@ -266,8 +266,9 @@ def _remark(column: Column | DescribedColumn, rows: int) -> str:
 
 def _more(content: McapDescription) -> list[RenderableType]:
     rows: list[RenderableType] = []
-    if len(content.channels) > _MOST_ROWS:
-        rows.append(Text(f"and {len(content.channels) - _MOST_ROWS} more channels", style="dim"))
+    hidden = max(len(content.channels) - _MOST_ROWS, 0) + content.unlisted
+    if hidden:
+        rows.append(Text(f"and {hidden} more channels", style="dim"))
     if content.empty_topics:
         names = ", ".join(shown(topic, 40) for topic in content.empty_topics[:8])
         rows.append(Text(f"declared without a message: {names}", style="dim"))

@@ -13,33 +13,11 @@ import numpy as np
 import pytest
 import zstandard
 
-from data.integrity import Integrity
 from data.mcap.container import MAGIC
-from data.mcap.walk import McapWalk
 from tests.data import hostile
+from tests.data.mcap.walks import integrity, walk
 
 CONFORMANCE = Path(__file__).parents[4] / "shared/realdata/mcap_conformance/conformance.tar.xz"
-
-
-def walk(content: bytes) -> tuple[McapWalk, list[tuple[int, int, bytes]]]:
-    """The walk, and its messages as (channel, log time, bytes)."""
-    found = McapWalk(np.frombuffer(content, np.uint8))
-    messages = [
-        (int(c), int(t), block.data[int(b) : int(b + n)].tobytes())
-        for block in found.blocks()
-        for c, t, b, n in zip(
-            block.messages.channel,
-            block.messages.log_time,
-            block.messages.begin,
-            block.messages.length,
-            strict=True,
-        )
-    ]
-    return found, messages
-
-
-def integrity(content: bytes) -> Integrity:
-    return walk(content)[0].integrity
 
 
 def conformance() -> Iterator[tuple[str, bytes, list[dict[str, object]]]]:
@@ -106,18 +84,6 @@ def test_a_lost_chunk_is_named_and_the_others_are_kept(tmp_path: Path) -> None:
     loss = found.integrity.losses[0]
     assert loss.time_range == (honest[0][1], honest[lost - 1][1])
     assert "0 to" not in found.integrity.left
-
-
-def test_after_a_false_length_the_next_chunk_is_found(tmp_path: Path) -> None:
-    content = bytearray(hostile.run(tmp_path / "run.mcap", n=20_000))
-    _, honest = walk(bytes(content))
-    mark = bytes(content).find(b"\x04\0\0\0zstd")
-    begin = mark - 37  # of the first chunk's record: opcode, then its length
-    assert content[begin] == 6
-    content[begin + 4] ^= 0x10
-    _, messages = walk(bytes(content))
-    assert 0 < len(messages) < len(honest)
-    assert messages == honest[-len(messages) :]
 
 
 def test_channels_lost_with_the_first_chunk_come_from_the_summary() -> None:
