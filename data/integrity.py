@@ -8,6 +8,7 @@ with a loss is refused unless the user asked for what is left, and nothing is ev
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final, Literal
 
 import numpy as np
@@ -109,17 +110,22 @@ class Integrity:
             Ascending, each from 1 to n - 1. Where the recorder's order leaves it open between which two
             messages the loss lies, all that it may be are given.
         """
+        anew = np.flatnonzero(np.diff(log_time) < -_DISORDER) + 1  # where the clock began anew
+        edges = [0, *anew.tolist(), log_time.size]
+        known = [(loss.before, loss.behind) for loss in self.losses]
         places: set[int] = set()
-        latest = np.maximum.accumulate(log_time)
-        for loss in self.losses:
-            if loss.before is None or loss.behind is None:
+        for before, behind in known:
+            if before is None or behind is None:
                 continue
-            last = int(np.searchsorted(latest, loss.before, "right"))
-            first = last
-            if loss.before - _DISORDER <= loss.behind <= loss.before:
-                first = int(np.searchsorted(latest, loss.behind, "left"))
-            places.update(range(first, last + 1))
-        return tuple(sorted(place for place in places if 0 < place < log_time.size))
+            if behind < before - _DISORDER:
+                places.update(k for k in anew.tolist() if log_time[k - 1] <= before and log_time[k] >= behind)
+                continue
+            for begin, end in pairwise(edges):
+                latest = np.maximum.accumulate(log_time[begin:end])
+                first = int(np.searchsorted(latest, min(behind, before + 1), "left"))
+                last = int(np.searchsorted(latest, before, "right"))
+                places.update(begin + k for k in range(first, last + 1) if 0 < k < end - begin)
+        return tuple(sorted(places))
 
     @property
     def left(self) -> str:

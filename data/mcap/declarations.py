@@ -7,7 +7,8 @@ of the two its messages mean, so from there on they are not read.
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Iterator
+from typing import Any, Final
 
 import numpy as np
 from mcap.opcode import Opcode
@@ -18,6 +19,7 @@ from data.mcap.fields import read_channel, read_schema
 from data.mcap.limits import DECLARED_BYTES, MOST_CHANNELS, MOST_DECLARATIONS, MOST_SCHEMAS
 from data.mcap.records import ByteArray, Damage, Tiling
 
+_DECLARES: Final = np.isin(np.arange(256), (Opcode.SCHEMA, Opcode.CHANNEL))  # by opcode
 _LONGEST_STRETCH: Final = 8 << 20  # [bytes] of declarations that are remembered as a whole
 
 
@@ -41,7 +43,7 @@ class Declarations:
         Refusals for the same reason are one: the first record of the tiling, how many, why, and whether it
         is no declaration at all, but damaged.
         """
-        places = np.flatnonzero((tiling.opcode == Opcode.SCHEMA) | (tiling.opcode == Opcode.CHANNEL))
+        places = np.flatnonzero(_DECLARES[tiling.opcode])
         if not places.size:
             return []
         first, last = int(places[0]), int(places[-1])
@@ -53,11 +55,17 @@ class Declarations:
                 return []
             self._stretch = bytes(stretch)
         refused: dict[tuple[str, bool], list[int]] = {}
+        for why, beyond in self._beyond(data, tiling, places):
+            refused[why, False] = [int(places[beyond][0]), int(beyond.sum())]
+            places = places[~beyond]
         columns = (places, tiling.opcode[places], tiling.begin[places], tiling.length[places])
         for place, opcode, begin, length in zip(*(column.tolist() for column in columns), strict=True):
+            content = bytes(data.data[begin : begin + length])
+            if self._raw.get((opcode, content[:2])) == content:
+                continue
             damaged = False
             try:
-                why = self._one(opcode, data.data[begin : begin + length], begin)
+                why = self._one(opcode, content, begin)
             except Damage as damage:
                 why, damaged = damage.why, True
             if why:
@@ -83,27 +91,43 @@ class Declarations:
             return f"{channels}, declared twice, differently"
         return f"{channels}, which {'is' if numbers.size == 1 else 'are'} nowhere declared with a schema"
 
-    def _one(self, opcode: int, content: memoryview, where: int) -> str:
+    def _beyond(
+        self, data: ByteArray, tiling: Tiling, places: NDArray[np.intp]
+    ) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+        """Which of the declarations at `places` are more than are read, and why."""
+        for opcode, known, most in (
+            (Opcode.SCHEMA, self.schemas, MOST_SCHEMAS),
+            (Opcode.CHANNEL, self.channels, MOST_CHANNELS),
+        ):
+            if len(known) < most:
+                continue
+            listed = np.zeros(1 << 16, np.bool_)
+            listed[list(known)] = True
+            begin = np.minimum(tiling.begin[places], data.size - 2)
+            number = data[begin] | (data[begin + 1].astype(np.uint16) << 8)
+            beyond = (tiling.opcode[places] == opcode) & (tiling.length[places] >= 2) & ~listed[number]
+            if beyond.any():
+                yield f"more than {most} {opcode.name.lower()}s are declared", beyond
+                places = places[~beyond]
+
+    def _one(self, opcode: int, content: bytes, where: int) -> str:
         """Take one declaration; why it is refused, if it is. Raises Damage when it contradicts itself."""
-        key = (opcode, bytes(content[:2]))
-        known = self._raw.get(key)
-        if known is not None and known == bytes(content):
-            return ""
+        is_schema = opcode == Opcode.SCHEMA
+        known: dict[int, Any] = self.schemas if is_schema else self.channels
+        most = MOST_SCHEMAS if is_schema else MOST_CHANNELS
+        key = (opcode, content[:2])
+        new = int.from_bytes(content[:2], "little") not in known
         self._compared += 1
         if self._compared > MOST_DECLARATIONS:
-            return f"more than {MOST_DECLARATIONS} declarations"
-        is_schema = opcode == Opcode.SCHEMA
-        if known is None and len(self.schemas if is_schema else self.channels) >= (
-            MOST_SCHEMAS if is_schema else MOST_CHANNELS
-        ):
-            most, kind = (MOST_SCHEMAS, "schemas") if is_schema else (MOST_CHANNELS, "channels")
-            return f"more than {most} {kind} are declared"
-        self._bytes += len(content) if known is None else 0
+            return f"more than {MOST_DECLARATIONS} declarations that differ"
+        if new and len(known) >= most:
+            return f"more than {most} {'schemas' if is_schema else 'channels'} are declared"
+        self._bytes += len(content) if new else 0
         if self._bytes > DECLARED_BYTES:
             return f"more than {DECLARED_BYTES} bytes of declarations"
         return self._schema(key, content, where) if is_schema else self._channel(key, content, where)
 
-    def _schema(self, key: tuple[int, bytes], content: memoryview, where: int) -> str:
+    def _schema(self, key: tuple[int, bytes], content: bytes, where: int) -> str:
         schema, _ = read_schema(content, where=where)
         if schema.id == 0:
             return "a schema numbered 0, which means none"
@@ -116,10 +140,10 @@ class Declarations:
                 self.contested.add((Opcode.SCHEMA, schema.id))
                 self._judge_users(schema.id)
             return f"schema {schema.id} is declared twice, differently"
-        self._raw[key] = bytes(content)
+        self._raw[key] = content
         return ""
 
-    def _channel(self, key: tuple[int, bytes], content: memoryview, where: int) -> str:
+    def _channel(self, key: tuple[int, bytes], content: bytes, where: int) -> str:
         channel, _ = read_channel(content, where=where)
         known = self.channels.get(channel.id)
         if known is None:
@@ -130,7 +154,7 @@ class Declarations:
         self._judge(channel.id)
         if known is not None and known != channel:
             return f"channel {channel.id} is declared twice, differently"
-        self._raw[key] = bytes(content)
+        self._raw[key] = content
         return ""
 
     def _is_contested(self, number: int) -> bool:

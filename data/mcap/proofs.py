@@ -1,7 +1,7 @@
 """What a walk has proved so far, and what it has lost: the making of an `Integrity`.
 
-A loss is told with the log times around it: that of the latest message before it, and the earliest one in
-the next messages behind it, which are not known yet when it is found.
+A loss is told with the log times around it: the latest one in the block before it, and the earliest one in
+the next block behind it, which is not known yet when it is found.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ class Proofs:
         self.notes: list[str] = []
         self.log: Times | None = None  # of the readable messages that have a time
         self.publish: Times | None = None
+        self._latest: int | None = None  # log time of the last block [ns]
         self._losses: list[Loss] = []
         self._waiting: list[int] = []  # losses behind which nothing has been read yet
         self._unproved = 0  # messages without a checksum
@@ -65,18 +66,18 @@ class Proofs:
         """Note that bytes are lost; with `gap`, messages may be missing at that place."""
         if gap:
             self._waiting.append(len(self._losses))
-        before = self.log[1] if gap and self.log else None
-        self._losses.append(Loss(begin, end, why, time_range, before))
+        self._losses.append(Loss(begin, end, why, time_range, self._latest if gap else None))
 
     def count(self, found: Messages, losses: list[tuple[Loss, bool]], *, checked: bool) -> None:
         """Take in a block's messages, and the losses among them with whether each leaves a gap."""
-        before = self.log[1] if self.log else None
+        before = self._latest
         timed = found.log_time[found.log_time > 0]
         if timed.size:
             for k in self._waiting:
                 self._losses[k] = replace(self._losses[k], behind=int(timed.min()))
             self._waiting.clear()
-            self.log = _wider(self.log, (int(timed.min()), int(timed.max())))
+            self._latest = int(timed.max())
+            self.log = _wider(self.log, (int(timed.min()), self._latest))
         published = found.publish_time[found.publish_time > 0]
         if published.size:
             self.publish = _wider(self.publish, (int(published.min()), int(published.max())))

@@ -22,7 +22,7 @@ from data.mcap.records import HEADER, MESSAGE_PREFIX, ByteArray, Damage, Message
 BLOCK_OPCODES: Final = frozenset({int(Opcode.SCHEMA), int(Opcode.CHANNEL), int(Opcode.MESSAGE)})
 _STAMPS: Final = slice(6, MESSAGE_PREFIX)  # of a message's prefix: log and publish time
 _FEW: Final = 16  # messages on an undeclared channel; with more in a block it is a channel of its own
-_KNOWN_OPCODES: Final = 15  # above it are records that are to be passed over
+_FOREIGN: Final = np.array([opcode < 16 and opcode not in BLOCK_OPCODES for opcode in range(256)])  # of ours
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,9 @@ def refused(tiling: Tiling, first: int, count: int, why: str, gap: bool) -> Drop
 
 def _foreign(tiling: Tiling) -> list[Dropped]:
     """Records that have no place among messages, such as a chunk within a chunk."""
-    odd = (tiling.opcode <= _KNOWN_OPCODES) & ~np.isin(tiling.opcode, list(BLOCK_OPCODES))
+    odd = _FOREIGN[tiling.opcode]
+    if not odd.any():
+        return []
     return [
         _stretch(tiling, run, f"a {Opcode(int(tiling.opcode[run[0]])).name.lower()} record among messages")
         for run in _runs(odd)

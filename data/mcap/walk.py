@@ -187,9 +187,7 @@ class McapWalk:
         except Damage as damage:
             raise Damage(begin, damage.why, resume=resume) from damage
         try:
-            tiling = tile(block, large=self.large)
-            dropped = [refused(tiling, *one) for one in self._declared.take(block, tiling)]
-            found = self._block(block, tiling, dropped, record=(here, end), checked=head.checksum != 0)
+            found = self._within(block, (here, end), checked=head.checksum != 0) if block.size else None
         except Damage as damage:
             raise Damage(begin, f"inside a chunk, {damage.why}", resume=resume) from damage
         if not agree:
@@ -199,6 +197,12 @@ class McapWalk:
         name = head.compression or "none"
         self.compressions[name] = self.compressions.get(name, 0) + 1
         return found, end
+
+    def _within(self, data: ByteArray, record: tuple[int, int], *, checked: bool) -> Block | None:
+        """The messages of a chunk's content; `record`: where the chunk stands in the file."""
+        tiling = tile(data)
+        dropped = [refused(tiling, *one) for one in self._declared.take(data, tiling)]
+        return self._block(data, tiling, dropped, record=record, checked=checked)
 
     def _stretch(self, here: int) -> tuple[Block | None, int]:
         """The messages that stand outside chunks from `here` on, and where to go on."""
@@ -298,6 +302,8 @@ class McapWalk:
         if self._metadata_bytes > METADATA_BYTES:
             raise Damage(begin, f"more than {METADATA_BYTES} bytes of metadata")
         most = MOST_METADATA - self._entries
+        if most <= 0:
+            raise Damage(begin, f"more than {MOST_METADATA} entries of metadata")
         found, used = read_metadata(self._content[begin:end].data, where=begin, most=most)
         if used != end - begin and self._if_followed(end) is None:
             raise Damage(begin, "a metadata record whose lengths do not add up")

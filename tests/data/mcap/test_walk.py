@@ -7,6 +7,7 @@ import tracemalloc
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import lz4.frame
 import numpy as np
@@ -14,13 +15,14 @@ import pytest
 import zstandard
 
 from data.mcap.container import MAGIC
+from data.mcap.walk import McapWalk
 from tests.data import hostile
 from tests.data.mcap.walks import integrity, walk
 
 CONFORMANCE = Path(__file__).parents[4] / "shared/realdata/mcap_conformance/conformance.tar.xz"
 
 
-def conformance() -> Iterator[tuple[str, bytes, list[dict[str, object]]]]:
+def conformance() -> Iterator[tuple[str, bytes, list[dict[str, Any]]]]:
     with tarfile.open(CONFORMANCE) as archive:
         files = {m.name: archive.extractfile(m) for m in archive.getmembers() if m.isfile()}
         for name, stream in files.items():
@@ -29,24 +31,56 @@ def conformance() -> Iterator[tuple[str, bytes, list[dict[str, object]]]]:
                 yield name, stream.read(), json.load(expected)["records"]
 
 
+def fields_of(records: list[dict[str, Any]], kind: str) -> list[dict[str, Any]]:
+    """What the expected records of one kind hold, numbers as text as they are listed."""
+    return [dict(item["fields"]) for item in records if item["type"] == kind]
+
+
+def raw(numbers: list[str]) -> bytes:
+    return bytes(int(number) for number in numbers)
+
+
 @pytest.mark.skipif(not CONFORMANCE.exists(), reason="the MCAP conformance files are not beside the project")
 def test_all_conformance_files_give_their_records() -> None:
     count = 0
     for name, content, records in conformance():
         found, messages = walk(content)
-        listed: dict[str, list[dict[str, object]]] = {}
-        for item in records:
-            listed.setdefault(str(item["type"]), []).append(dict(item["fields"]))  # type: ignore[call-overload]  # JSON
-        expected = [
-            (int(str(m["channel_id"])), int(str(m["log_time"])), bytes(int(b) for b in m["data"]))  # type: ignore[attr-defined]  # JSON
-            for m in listed.get("Message", [])
-        ]
-        assert messages == expected, name
         assert found.integrity.whole, name
-        assert [a.name for a in found.attachments] == [a["name"] for a in listed.get("Attachment", [])]
-        assert [m.metadata for m in found.metadata] == [m["metadata"] for m in listed.get("Metadata", [])]
+        assert messages == [
+            (int(m["channel_id"]), int(m["log_time"]), raw(m["data"])) for m in fields_of(records, "Message")
+        ], name
+        attachments = [
+            {
+                "name": one.name,
+                "media_type": one.media_type,
+                "log_time": str(one.log_time),
+                "create_time": str(one.create_time),
+                "data": [str(byte) for byte in content[one.offset : one.offset + one.size]],
+            }
+            for one in found.attachments
+        ]
+        assert attachments == fields_of(records, "Attachment"), name
+        assert all(one.checksum == "verified" for one in found.attachments)
+        assert [{"name": m.name, "metadata": m.metadata} for m in found.metadata] == [
+            {"name": m["name"], "metadata": m["metadata"]} for m in fields_of(records, "Metadata")
+        ], name
+        assert listed_statistics(found) == fields_of(records, "Statistics"), name
+        declared = {channel["id"]: channel for channel in fields_of(records, "Channel")}
+        assert {
+            str(channel.id): (channel.topic, channel.message_encoding, str(channel.schema_id))
+            for channel in found.channels.values()
+        } == {k: (c["topic"], c["message_encoding"], c["schema_id"]) for k, c in declared.items()}, name
         count += 1
     assert count == 416
+
+
+def listed_statistics(found: McapWalk) -> list[dict[str, Any]]:
+    """A file's statistics as the expected records list them."""
+    if found.statistics is None:
+        return []
+    counts = found.statistics.channel_message_counts
+    plain = {key: str(value) for key, value in vars(found.statistics).items()}
+    return [plain | {"channel_message_counts": {str(k): str(v) for k, v in counts.items()}}]
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
