@@ -34,6 +34,7 @@ def describe(path: Path) -> McapDescription:
         compressions={},
         indexed=True,
         channels=channels,
+        unlisted=0,
         empty_topics=empty,
         metadata={},
         attachments=(),

@@ -200,7 +200,7 @@ class McapWalk:
 
     def _within(self, data: ByteArray, record: tuple[int, int], *, checked: bool) -> Block | None:
         """The messages of a chunk's content; `record`: where the chunk stands in the file."""
-        tiling = tile(data)
+        tiling = tile(data, large=self.large)
         dropped = [refused(tiling, *one) for one in self._declared.take(data, tiling)]
         return self._block(data, tiling, dropped, record=record, checked=checked)
 
