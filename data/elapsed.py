@@ -57,11 +57,13 @@ def _fixed_point(cells: Sequence[str], decimal: str) -> tuple[NDArray[np.int64],
         if np.any(places[:, sign] != ord(decimal)):
             return None
         places = np.delete(places, sign, axis=1)
-    digits = places.astype(np.int64) - ord("0")
-    if np.any((digits < 0) | (digits > 9)) or (digits.shape[1] == _WIDEST and np.any(digits[:, 0] == 9)):
+    digits = places - np.uint8(ord("0"))  # what is below wraps to what is above
+    if np.any(digits > 9) or (digits.shape[1] == _WIDEST and np.any(digits[:, 0] == 9)):
         return None
-    powers = 10 ** np.arange(digits.shape[1] - 1, -1, -1, dtype=np.int64)
-    return digits @ powers, width - sign - 1 if sign >= 0 else 0
+    ticks = np.zeros(digits.shape[0], np.int64)
+    for place in digits.T:
+        ticks = 10 * ticks + place
+    return ticks, width - sign - 1 if sign >= 0 else 0
 
 
 def unset_lead(seconds: FloatArray) -> int:

@@ -86,6 +86,7 @@ def read_recording(
         torque=logged.signals["torque"],
         velocity=logged.signals.get("velocity"),
         reference=logged.signals.get("reference"),
+        breaks=logged.breaks,
     )
     if window is not None:
         run = _cut(run, window)

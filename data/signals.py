@@ -34,6 +34,7 @@ SUFFIXES: Final[dict[str, Format]] = {
     ".mat": "mat",
     ".bag": "bag",
     ".db3": "bag",
+    ".lvm": "csv",
 }
 
 
@@ -91,6 +92,22 @@ class CsvDialect:
     decimal: Literal[".", ","] | None = None
     encoding: str | None = None
     header: bool | None = None  # whether a row of names stands above the numbers
+    units_row: bool | None = None  # whether a row of units stands between names and numbers
+    comment: str | None = None  # what a line of comment begins with; empty: there are none
+    quote: str | None = None  # one character around cells; empty: a quotation mark is like any other
+    lines_before_numbers: int | None = None
+
+    def __post_init__(self) -> None:
+        delimiter, quote = self.delimiter, self.quote
+        if delimiter not in {None, "whitespace"} and not _is_mark(delimiter or ""):
+            raise LogError(f'the delimiter {delimiter!r} is not one ASCII character, nor "whitespace"')
+        if quote and (not _is_mark(quote) or quote == delimiter):
+            raise LogError(f"the quote {quote!r} is not one ASCII character other than the delimiter")
+
+
+def _is_mark(text: str) -> bool:
+    """Whether a text is one character that can stand between cells or around them."""
+    return len(text) == 1 and text.isascii() and not text.isalnum() and text not in "\r\n\0.+-"
 
 
 @dataclass(frozen=True)

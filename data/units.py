@@ -52,6 +52,7 @@ _TABLE: Final[tuple[tuple[Kind, float, tuple[str, ...]], ...]] = (
     ("time", 1e-3, ("ms", "msec", "millisecond", "milliseconds")),
     ("time", 1e-6, ("us", "usec", "microsecond", "microseconds")),
     ("time", 1e-9, ("ns", "nsec", "nanosecond", "nanoseconds")),
+    ("time", 1e-7, ("100 ns", "100ns", "FILETIME", "filetime")),
     ("time", 60.0, ("min", "minute", "minutes")),
     ("angle", 1.0, ("rad", "radian", "radians")),
     ("angle", 1e-3, ("mrad", "milliradian", "milliradians")),

@@ -6,6 +6,7 @@ draws it for a person. Its status says whether the log is whole, readable in par
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from dataclasses import asdict, dataclass
@@ -114,6 +115,17 @@ def to_plain(inspection: Inspection) -> dict[str, Any]:
     return {key: _finite(value) for key, value in (shared | own).items()}
 
 
+def frozen_dialect(content: CsvDescription) -> str:
+    """The dialect found, as a line for [signals] or [[experiment]] in campaign.toml."""
+    pairs = asdict(content.layout.frozen).items()
+    return "dialect = { " + ", ".join(f"{key} = {_toml(value)}" for key, value in pairs) + " }"
+
+
+def _toml(value: str | bool | int) -> str:
+    """A value as TOML writes it; its strings escape as JSON's do."""
+    return json.dumps(value).replace("\x7f", "\\u007f")
+
+
 def _mcap(content: McapDescription) -> dict[str, Any]:
     return {
         "profile": content.profile,
@@ -135,9 +147,12 @@ def _dialect(content: CsvDescription) -> dict[str, Any]:
             "decimal": layout.decimal,
             "encoding": layout.encoding,
             "header": bool(layout.headers),
+            "units_row": layout.units_row,
             "comment": layout.comment,
+            "quote": layout.quote,
             "lines_before_numbers": layout.first_row,
-        }
+        },
+        "frozen": frozen_dialect(content),
     }
 
 

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from data.clocks import ClockReport, clock_report
-from data.csv.dialect import CsvLayout, bare, sniff
+from data.csv.clocks import time_columns
+from data.csv.dialect import sniff
+from data.csv.layout import CsvLayout
 from data.csv.log import CsvTable, elapsed, read_csv, table_integrity
-from data.findings import LogError
+from data.csv.text import ByteArray
 from data.integrity import Integrity, Loss
 from data.units import known_unit
 
-TIME_NAMES = ("t", "time", "__time", "timestamp")  # columns that are plainly the time
+_NO_TIME = 1e100  # of any unit
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ class CsvDescription:
     integrity: Integrity
 
 
-def describe(content: bytes) -> CsvDescription:
+def describe(content: bytes | ByteArray) -> CsvDescription:
     """Describe a file's bytes.
 
     Raises
@@ -53,48 +55,25 @@ def describe(content: bytes) -> CsvDescription:
         When it is no text, or holds no numbers. Rows that do not fit the others are a loss, not an error.
     """
     layout = sniff(content)
-    tables, reasons = _tables(content, layout)
-    values = {k: table.values[k] for k, table in tables.items()}
-    rows = max((array.size for array in values.values()), default=0)
-    columns = tuple(_column(k, layout, values.get(k), reasons.get(k)) for k in range(layout.columns))
-    clock, clock_column = _clock(layout, tables)
+    times = time_columns(layout)
+    table = read_csv(content, layout, range(layout.columns), clocks=times, strict=False)
+    columns = tuple(
+        _column(k, layout, table.values.get(k), table.reasons.get(k)) for k in range(layout.columns)
+    )
+    clock, clock_column = _clock(table, times)
+    integrity = table_integrity(table)
+    if not table.values:
+        why = next(iter(table.reasons.values()), "no column of numbers")
+        integrity = Integrity("absent", losses=(Loss(0, len(content), why),), counted="rows")
     return CsvDescription(
         layout=layout,
-        rows=rows,
+        rows=table.rows.kept,
         columns=columns,
         clock=clock,
         clock_column=clock_column,
         metadata=layout.metadata,
-        integrity=_integrity(content, tables, reasons, rows=rows),
+        integrity=integrity,
     )
-
-
-def _integrity(
-    content: bytes, tables: Mapping[int, CsvTable], reasons: Mapping[int, str], *, rows: int
-) -> Integrity:
-    """What is lost of the file; all of it when no column can be read."""
-    for table in tables.values():
-        return table_integrity(table, rows=rows)
-    why = next(iter(reasons.values()), "no column of numbers")
-    return Integrity("absent", losses=(Loss(0, len(content), why),), counted="rows")
-
-
-def _tables(content: bytes, layout: CsvLayout) -> tuple[dict[int, CsvTable], dict[int, str]]:
-    """The tables that hold the columns of numbers, and why the other columns are none."""
-    everything = range(layout.columns)
-    try:
-        table = read_csv(content, layout, everything)
-    except LogError:
-        tables: dict[int, CsvTable] = {}
-        reasons: dict[int, str] = {}
-    else:
-        return dict.fromkeys(everything, table), {}
-    for k in everything:
-        try:
-            tables[k] = read_csv(content, layout, [k])
-        except LogError as error:
-            reasons[k] = str(error)
-    return tables, reasons
 
 
 def _column(k: int, layout: CsvLayout, values: NDArray[np.float64] | None, why: str | None) -> Column:
@@ -112,14 +91,18 @@ def _column(k: int, layout: CsvLayout, values: NDArray[np.float64] | None, why: 
     )
 
 
-def _clock(layout: CsvLayout, tables: Mapping[int, CsvTable]) -> tuple[ClockReport | None, str | None]:
-    for k, header in enumerate(layout.headers):
-        if bare(header).lower() in TIME_NAMES and k in tables:
-            unit = known_unit(layout.units[k] or "s")
-            factor = unit.factor if unit and unit.kind == "time" else 1.0
-            stamps = tables[k].values[k] * factor
-            seconds = elapsed(tables[k], k) * factor
-            known = np.isfinite(stamps)
-            first = float(stamps[known][0]) if known.any() else 0.0
-            return clock_report(seconds[known], start=first), header
+def _clock(table: CsvTable, times: Sequence[int]) -> tuple[ClockReport | None, str | None]:
+    """The first column that is plainly the time, as a clock."""
+    for k in times:
+        if k not in table.values or not table.values[k].size:
+            continue
+        if not np.all(np.abs(table.values[k][np.isfinite(table.values[k])]) < _NO_TIME):
+            continue
+        unit = known_unit(table.layout.units[k] or "s")
+        factor = unit.factor if unit and unit.kind == "time" else 1.0
+        stamps = table.values[k] * factor
+        seconds = elapsed(table, k) * factor
+        known = np.isfinite(stamps)
+        first = float(stamps[known][0]) if known.any() else 0.0
+        return clock_report(seconds[known], start=first), table.layout.headers[k]
     return None, None

@@ -5,266 +5,305 @@ commas; a byte order mark, UTF-16, latin-1; comment lines, settings as `# KEY: v
 types; or no header at all. The dialect here is the one under which most of the sampled lines split into the
 same number of cells and most cells are numbers. What is found is a value that can be shown, and every part
 of it can be frozen by the campaign instead.
-
-Parsing itself is left to pandas' C engine, which is exact for all of these.
 """
 
 from __future__ import annotations
 
-import csv
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final, Literal
+from functools import partial
+from typing import Final
 
+from data.csv.cells import Decimal, is_missing, is_number, numeric_share, split
+from data.csv.headers import LABVIEW_END, is_units_row, names_pairs, read_above
+from data.csv.layout import CsvLayout, declared_unit
+from data.csv.records import Record, records
+from data.csv.text import ByteArray, Text, lines, open_text, utf8
 from data.findings import LogError
 from data.names import shown
 from data.signals import CsvDialect
-from data.units import known_unit
 
-Decimal = Literal[".", ","]
-_HEAD: Final = 1 << 17  # bytes that are looked at
+_HEADS: Final = (1 << 17, 1 << 22)  # bytes that are looked at; more where no number stands in the first
 _SAMPLE: Final = 200  # lines of them
+_CELLS: Final = 40_000  # cells of them
+_TYPED: Final = 50  # rows by which a column is one of numbers or of words
 _COMMENTS: Final = ("#", "%", "//")
 _DELIMITERS: Final = (",", ";", "\t", "whitespace")
-_NUMBER: Final = {
-    ".": re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
-    ",": re.compile(r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infinity)", re.IGNORECASE),
-}
-_BRACKETED: Final = re.compile(r"^(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))$")
-_SUFFIXED: Final = re.compile(r"^.+_(deg|rad|mrad|rpm)$")  # the only endings that cannot mean anything else
-_SETTING: Final = re.compile(r"((?:[\w.\-/ ]{1,60}(?=:))|(?:[\w.\-]{1,60}(?= ?=))) ?[:=] *(.*)")
-_UNITS_ROW: Final = re.compile(r"units?:?$|einheit:?$", re.IGNORECASE)
+_FILETIME: Final = 17  # digits of a time that Windows counts from 1601; in ms they would be a million years
+_LIKE_A_NUMBER: Final = re.compile(r"[+-]?[.,]?\d")
+_SEPARATOR: Final = re.compile(r'"?sep=([\t ,;|:!$&*/<>?@\\^_~])"?', re.IGNORECASE)
+_NO_NUMBERS: Final = "no line of its first part looks like a row of numbers; is it a log?"
 
 
-@dataclass(frozen=True)
-class CsvLayout:
-    """What was found of one file."""
-
-    delimiter: str  # one character, or "whitespace"
-    decimal: Decimal
-    encoding: str
-    headers: tuple[str, ...]  # as they stand, empty where there is no header
-    units: tuple[str | None, ...]  # what header, units row or name declare; None: nothing
-    columns: int
-    first_row: int  # lines before the first row of numbers
-    comment: str | None
-    metadata: dict[str, str]
-
-    @property
-    def described(self) -> str:
-        """One clause for a person."""
-        names = {",": "comma", ";": "semicolon", "\t": "tab", "whitespace": "blanks"}
-        parts = [
-            f"{names.get(self.delimiter, self.delimiter)} between cells",
-            f"decimal {'comma' if self.decimal == ',' else 'point'}",
-            self.encoding,
-            "a header" if self.headers else "no header",
-        ]
-        return ", ".join(parts)
-
-
-def sniff(content: bytes, frozen: CsvDialect | None = None) -> CsvLayout:
+def sniff(content: bytes | ByteArray, frozen: CsvDialect | None = None) -> CsvLayout:
     """Find out how a CSV file is written.
 
     Parameters
     ----------
     content
-        The file, or its first part.
+        The file.
     frozen
         What the campaign has fixed; only the rest is found out.
 
     Raises
     ------
     LogError
-        When it is no text, or no line of it looks like numbers.
+        When it is no text, no line of it looks like numbers, or its names do not fit its numbers.
     """
     frozen = frozen or CsvDialect()
-    encoding = frozen.encoding or _encoding(content)
-    lines = _head(content, encoding)
-    comment = next((mark for mark in _COMMENTS for line in lines if line.startswith(mark)), None)
-    delimiter, decimal, columns = _shape(lines, frozen)
-    rows = [split(line, delimiter) for line in lines]
-    first = next(
-        (
-            k
-            for k, row in enumerate(rows)
-            if len(row) == columns and not _is_comment(lines[k]) and numeric_share(row, decimal) >= 0.5
-        ),
-        None,
-    )
+    text = open_text(content, frozen.encoding)
+    for size in _HEADS:
+        head, whole = _head(text, size)
+        if not any(line.strip() for line in head):
+            raise LogError("it is empty")
+        layout = _layout(head, frozen, text.encoding)
+        if layout is not None:
+            return layout
+        if whole:
+            break
+    raise LogError(_NO_NUMBERS)
+
+
+def _head(text: Text, size: int) -> tuple[list[str], bool]:
+    """The first whole lines without their ends, and whether they are all."""
+    block, end = text.block(text.begin, size)
+    decoded = [
+        line.decode(errors="replace").rstrip("\r\n") for line in lines(utf8(block, text.codec_of_block))
+    ]
+    return decoded, end >= text.end
+
+
+def _layout(head: Sequence[str], frozen: CsvDialect, encoding: str) -> CsvLayout | None:
+    """The dialect of a file's first lines; None where none of them looks like numbers."""
+    marks = _COMMENTS if frozen.comment is None else tuple(filter(None, (frozen.comment,)))
+    quote = '"' if frozen.quote is None else frozen.quote
+    top = records(head, quote=quote, marks=marks)
+    declared = _SEPARATOR.fullmatch(head[0].strip("\ufeff")) if head else None
+    delimiter = frozen.delimiter or (declared[1] if declared else None)
+    comment = frozen.comment if frozen.comment is not None else _comment(head)
+    floor = frozen.lines_before_numbers or _behind_labview_headers(head)
+    sample = [_before(line, comment) for line in _sample(top, floor, marks)]
+    shape = _shape(sample, delimiter, frozen.decimal, quote)
+    if shape is None:
+        return None
+    delimiter, decimal, columns = shape
+    rows = [_cells(record.text, comment, delimiter, quote, columns=columns) for record in top]
+    first = _first_row(top, rows, columns=columns, decimal=decimal, frozen=frozen, marks=marks, floor=floor)
     if first is None:
-        raise LogError("no line of its first part looks like a row of numbers; is it a log?")
-    above = [k for k in range(first) if lines[k].strip()]
-    headers, units_row = _headers(lines, rows, above, columns=columns)
-    if frozen.header is False:
-        headers = ()
-    declared = tuple(
-        (units_row[k] if units_row else None) or (declared_unit(headers[k]) if headers else None)
-        for k in range(columns)
+        return None
+    if frozen.lines_before_numbers is None:
+        first = _with_damaged(top, rows, first, marks)
+    _require_no_hidden_row(top[:first], rows[:first], columns=columns, decimal=decimal, marks=marks)
+    passed = [k for k in range(first) if _is_row(top[k], rows[k], columns, decimal, marks)]
+    if passed and frozen.lines_before_numbers is not None:
+        raise LogError(
+            f"line {top[passed[0]].first + 1} is a row of numbers, but the campaign says that "
+            f"{frozen.lines_before_numbers} lines stand before the first (`lines_before_numbers`): samples "
+            "would be passed over. Correct it, or leave it out"
+        )
+    found = partial(
+        read_above, columns=columns, marks=marks, header=frozen.header, units_row=frozen.units_row
     )
+    above = found(top[:first], rows[:first])
+    if frozen.header and not above.names and frozen.lines_before_numbers is None and first + 1 < len(top):
+        first += 1  # names that are numbers
+        above = found(top[:first], rows[:first])
+    if frozen.header and not above.names:
+        raise LogError(
+            f"no row of {columns} names stands above its numbers, and the campaign says `header = true`"
+        )
+    units = above.units or [None] * columns
+    if above.paired and len(rows[first][0].partition(decimal)[0]) >= _FILETIME:
+        units[0::2] = ["100 ns"] * len(units[0::2])
     return CsvLayout(
         delimiter=delimiter,
         decimal=decimal,
         encoding=encoding,
-        headers=headers,
-        units=declared,
+        headers=above.names,
+        units=tuple(
+            units[k] or (declared_unit(above.names[k]) if above.names else None) for k in range(columns)
+        ),
         columns=columns,
-        first_row=first,
-        comment=comment[0] if comment and len(comment) == 1 else None,
-        metadata=_metadata(lines[:first]),
+        first_row=top[first].first,
+        comment=comment or None,
+        metadata=above.metadata,
+        quote=quote,
+        units_row=above.units_row,
     )
 
 
-def split(line: str, delimiter: str) -> list[str]:
-    """The cells of a line, quotes and outer blanks removed."""
-    if delimiter == "whitespace":
-        return line.split()
-    cells = next(csv.reader([line], delimiter=delimiter), [])
-    return [cell.strip() for cell in cells]
+def _comment(head: Sequence[str]) -> str:
+    """What lines of comment begin with; empty where there are none."""
+    return next((mark for mark in _COMMENTS for line in head if line.startswith(mark)), "")
 
 
-def bare(header: str) -> str:
-    """A header without its unit: `q` for `q [deg]`."""
-    found = _BRACKETED.match(header.strip())
-    return (found[1] if found else header).strip()
+def _before(line: str, comment: str) -> str:
+    """A line without the comment behind its cells."""
+    return line.partition(comment)[0] if comment and not line.lstrip().startswith(comment) else line
 
 
-def declared_unit(header: str) -> str | None:
-    """The unit that a header declares, in brackets or by an ending that can mean nothing else; None: none."""
-    found = _BRACKETED.match(header.strip())
-    word = (found[2] or found[3] or "") if found else ""
-    if not word:
-        ending = _SUFFIXED.match(header.strip())
-        word = ending[1] if ending else ""
-    return word.strip() if word and known_unit(word) else None
+def _cells(line: str, comment: str, delimiter: str, quote: str, *, columns: int) -> list[str]:
+    """The cells of a line, with or without a comment behind them."""
+    cells = split(_before(line, comment), delimiter, quote)
+    return cells if len(cells) == columns else split(line, delimiter, quote)
 
 
-def _encoding(content: bytes) -> str:
-    head = content[:_HEAD]
-    for mark, name in ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16")):
-        if head.startswith(mark):
-            return name
-    if b"\0" in head:
-        even, odd = head[0::2].count(0), head[1::2].count(0)
-        if max(even, odd) > 0.4 * len(head) / 2 and min(even, odd) == 0:
-            return "utf-16-le" if odd else "utf-16-be"
-        raise LogError("it holds NUL bytes: it is no text file, or a damaged one")
-    try:
-        content.decode("utf-8")
-    except UnicodeDecodeError:
-        return "latin-1"
-    return "utf-8"
+def _behind_labview_headers(head: Sequence[str]) -> int:
+    """Lines to the end of LabVIEW's second header, which closes with the same words as the first."""
+    ends = [k for k, line in enumerate(head) if line.startswith(LABVIEW_END)]
+    return ends[min(1, len(ends) - 1)] + 1 if ends else 0
 
 
-def _head(content: bytes, encoding: str) -> list[str]:
-    """The first lines as text, without a last one that may be cut."""
-    try:
-        text = content[:_HEAD].decode(encoding, errors="ignore" if len(content) > _HEAD else "strict")
-    except (UnicodeDecodeError, LookupError) as error:
-        raise LogError(f"it cannot be read as {shown(encoding, 30)} ({error})") from error
-    lines = text.splitlines()
-    if len(content) > _HEAD and len(lines) > 1:
-        lines = lines[:-1]
-    if not any(line.strip() for line in lines):
-        raise LogError("it is empty")
-    return lines
+def _sample(top: Sequence[Record], floor: int, marks: tuple[str, ...]) -> list[str]:
+    """Lines by which the dialect is told: the last of the first part, which are rows if any are."""
+    plain = [
+        record.text
+        for record in top
+        if record.first >= floor
+        and record.text.strip()
+        and "\0" not in record.text
+        and not record.text.lstrip().startswith(marks)
+    ]
+    sample = plain[-_SAMPLE:]
+    cells = max((len(line) for line in sample), default=0) // 4 + 1
+    return sample[-max(10, _CELLS // cells) :]
 
 
-def _is_comment(line: str) -> bool:
-    return line.lstrip().startswith(_COMMENTS)
-
-
-def _shape(lines: Sequence[str], frozen: CsvDialect) -> tuple[str, Decimal, int]:
+def _shape(
+    sample: Sequence[str], frozen: str | None, sign: Decimal | None, quote: str
+) -> tuple[str, Decimal, int] | None:
     """Delimiter, decimal sign and number of columns under which the lines look most like numbers."""
-    plain = [line for line in lines if line.strip() and not _is_comment(line)]
-    sample = plain[-_SAMPLE:] if len(plain) > _SAMPLE else plain
-    best: tuple[float, float, int] = (0.0, 0.0, 0)
+    best: tuple[float, int, float] = (0.0, 0, 0.0)
     chosen: tuple[str, Decimal, int] | None = None
-    quoted = any('"' in line for line in sample)  # which tells a decimal comma from one between cells
-    decimals: tuple[Decimal, ...] = (frozen.decimal,) if frozen.decimal else (".", ",")
-    for delimiter in (frozen.delimiter,) if frozen.delimiter else _DELIMITERS:
+    quoted = bool(quote) and any(quote in line for line in sample)  # tells a decimal comma from one between
+    decimals: tuple[Decimal, ...] = (sign,) if sign else (".", ",")
+    for delimiter in (frozen,) if frozen else _DELIMITERS:
+        split_rows = [split(line, delimiter, quote) for line in sample]
         for decimal in decimals:
             if decimal == delimiter and not quoted:
                 continue
-            rows = [split(line, delimiter) for line in sample]
-            numeric = [row for row in rows if numeric_share(row, decimal) >= 0.5]
+            shares = [numeric_share(row, decimal) for row in split_rows]
+            numeric = [k for k, share in enumerate(shares) if share >= 0.5]
             if not numeric:
                 continue
-            columns, alike = Counter(len(row) for row in numeric).most_common(1)[0]
-            cells = sum(numeric_share(row, decimal) for row in numeric) / len(numeric)
-            score = (
-                round(alike / len(sample) * cells, 2) if columns > 1 else 0.01,
-                float(decimal == "."),
-                columns,
-            )
-            if chosen is None or (score[0], score[2], score[1]) > (best[0], best[2], best[1]):
-                best, chosen = score, (delimiter, decimal, columns)
-    if chosen is None:
-        raise LogError("no line of its first part looks like a row of numbers; is it a log?")
+            columns, alike = Counter(len(split_rows[k]) for k in numeric).most_common(1)[0]
+            cells = sum(shares[k] for k in numeric) / len(numeric)
+            score = round(alike / len(sample) * cells, 2) if columns > 1 else 0.01
+            key = (score, columns, float(decimal == "."))
+            if chosen is None or key > best:
+                best, chosen = key, (delimiter, decimal, columns)
     return chosen
 
 
-def numeric_share(row: Sequence[str], decimal: Decimal) -> float:
-    """The share of a row's filled cells that are numbers; 0 for a row without any."""
-    filled = [cell for cell in row if cell]
-    if not filled:
-        return 0.0
-    return sum(_NUMBER[decimal].fullmatch(cell) is not None for cell in filled) / len(filled)
+def _first_row(
+    top: Sequence[Record],
+    rows: Sequence[list[str]],
+    *,
+    columns: int,
+    decimal: Decimal,
+    frozen: CsvDialect,
+    marks: tuple[str, ...],
+    floor: int,
+) -> int | None:
+    """Which record is the first row of numbers.
+
+    Raises
+    ------
+    LogError
+        When the first that looks like one holds words where all below it hold numbers.
+    """
+    if frozen.lines_before_numbers is not None:
+        return next((k for k, record in enumerate(top) if record.first >= frozen.lines_before_numbers), None)
+    paired = any(names_pairs(row, columns) for row in rows)
+    alike = [
+        k
+        for k, row in enumerate(rows)
+        if len(row) == columns
+        and top[k].first >= floor
+        and not (marks and top[k].text.lstrip().startswith(marks))
+        and numeric_share(row, decimal) >= 0.5
+        and not (paired and row[0] and not is_number(row[0], decimal))
+    ]
+    unlike = {
+        k: words
+        for place, k in enumerate(alike[:_SAMPLE])
+        if (words := _words(rows[k], [rows[other] for other in alike[place + 1 :][:_TYPED]], decimal))
+    }
+    first = next((k for k in alike if k not in unlike), None)
+    above = [k for k in unlike if first is None or k < first]
+    if not above or first is None:
+        return first
+    named = [k for k in range(first) if len(rows[k]) == columns and _share(rows[k], decimal) == 0.0]
+    settings = bool(named) and named[-1] > above[-1]
+    names = frozen.header is True and not named
+    if settings or names or all(is_units_row(rows[k], columns) for k in above):
+        return first
+    raise LogError(
+        f"line {top[above[0]].first + 1} holds {shown(unlike[above[0]][0], 40)!r} where the rows below "
+        "it hold numbers, and numbers beside it: it may be a row of names, of units, or a damaged one. Say "
+        "`header = true` or `lines_before_numbers` under `dialect` in campaign.toml"
+    )
 
 
-def _headers(
-    lines: Sequence[str], rows: Sequence[list[str]], above: Sequence[int], *, columns: int
-) -> tuple[tuple[str, ...], list[str | None] | None]:
-    """The row of names above the numbers, and a row of units, where there are any."""
-    names: tuple[str, ...] = ()
-    units: list[str | None] | None = None
-    for k in reversed(above):
-        if _is_comment(lines[k]):
-            if not names and k == above[-1] and (bare_row := _commented_header(lines[k], rows[k], columns)):
-                return bare_row, units
+def _share(row: Sequence[str], decimal: Decimal) -> float:
+    """The share of numbers in a row; 1 where it is empty."""
+    return numeric_share(row, decimal) if any(row) else 1.0
+
+
+def _with_damaged(
+    top: Sequence[Record], rows: Sequence[list[str]], first: int, marks: tuple[str, ...]
+) -> int:
+    """The first row, or the damaged rows right above it, which begin with a number but are no rows."""
+    start = first
+    for k in range(first - 1, -1, -1):
+        if not top[k].text.strip():
             continue
-        row = rows[k] + [""] * (columns - len(rows[k]))
-        if len(rows[k]) > columns or sum(bool(cell) for cell in row) < min(2, columns):
-            continue
-        if units is None and _is_units_row(row):
-            units = [word.strip("[]()") if known_unit(word.strip("[]()")) else None for word in row]
-            continue
-        if row[0].endswith(":") and any(k2 < k for k2 in above):
-            continue  # a metadata row such as `Type:`
-        names = tuple(row)
-        break
-    return names, units
+        filled = [cell for cell in rows[k] if cell]
+        commented = bool(marks) and top[k].text.lstrip().startswith(marks)
+        damaged = "\0" in top[k].text or (bool(filled) and _LIKE_A_NUMBER.match(filled[0]) is not None)
+        if commented or not damaged:
+            break
+        start = k
+    return start
 
 
-def _commented_header(line: str, row: Sequence[str], columns: int) -> tuple[str, ...]:
-    """A header behind a comment mark, as numpy writes it; empty when the line is something else."""
-    if re.match(r"^\W+[^:,;\t]+:", line):
-        return ()
-    mark = next(mark for mark in _COMMENTS if line.lstrip().startswith(mark))
-    cells = [cell for cell in (row[0].lstrip().removeprefix(mark).strip(), *row[1:]) if cell]
-    return tuple(cells) if len(cells) == columns else ()
+def _require_no_hidden_row(
+    above: Sequence[Record],
+    rows: Sequence[list[str]],
+    *,
+    columns: int,
+    decimal: Decimal,
+    marks: tuple[str, ...],
+) -> None:
+    """Refuse a first row that passes for a comment since its first cell begins like one."""
+    for record, row in zip(reversed(above), reversed(rows), strict=True):
+        if not marks or not record.text.lstrip().startswith(marks):
+            return
+        first = row[0].lstrip("".join(marks)).strip() if row else ""
+        if len(row) == columns > 1 and numeric_share(row[1:], decimal) == 1.0 and is_missing(first) and first:
+            raise LogError(
+                f"line {record.first + 1} begins with {shown(row[0], 30)!r}, which reads like a comment, but "
+                "a row of numbers follows: a sample would be lost unseen"
+            )
 
 
-def _is_units_row(row: Sequence[str]) -> bool:
-    first, *rest = row
-    words = [word.strip("[]()") for word in (rest if _UNITS_ROW.match(first) else row)]
-    known = [known_unit(word) is not None for word in words if word not in {"", "-", "1"}]
-    if _UNITS_ROW.match(first):
-        return True
-    # A header of single letters (`t`, `s`, `A`) is rarely all units; brackets or two known words make a row.
-    return len(known) >= min(2, len(row)) and all(known)
+def _is_row(
+    record: Record, row: Sequence[str], columns: int, decimal: Decimal, marks: tuple[str, ...]
+) -> bool:
+    """Whether a record can be nothing but a row of numbers."""
+    commented = bool(marks) and record.text.lstrip().startswith(marks)
+    return len(row) == columns and not commented and numeric_share(row, decimal) == 1.0
 
 
-def _metadata(lines: Sequence[str]) -> dict[str, str]:
-    """Settings written as `# KEY: value` (or `=`) before the numbers."""
-    found: dict[str, str] = {}
-    for line in lines:
-        if not _is_comment(line):
-            continue
-        text = line.lstrip().lstrip("#%/").strip()
-        setting = _SETTING.fullmatch(text)
-        if setting and len(found) < 1000:
-            found.setdefault(setting[1].strip(), setting[2].strip())
-    return found
+def _words(row: Sequence[str], below: Sequence[Sequence[str]], decimal: Decimal) -> list[str]:
+    """Cells of a row that are words in columns of numbers."""
+    if len(below) < 2:
+        return []
+    return [
+        cell
+        for k, cell in enumerate(row)
+        if not is_number(cell, decimal)
+        and not is_missing(cell)
+        and sum(is_number(other[k], decimal) or is_missing(other[k]) for other in below) > 0.9 * len(below)
+    ]

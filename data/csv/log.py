@@ -9,18 +9,21 @@ Written with the shortest decimals that read back as the same number, bit for bi
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
-from typing import Any, Final
 
 import numpy as np
-import pandas as pd
+import pyarrow as pa
+import pyarrow.csv as arrow_csv
 from numpy.typing import NDArray
 
-from data.csv.dialect import CsvLayout, bare
-from data.csv.rows import Rows, whole_rows
+from data.csv.cells import NotNumbersError, numbers
+from data.csv.layout import CsvLayout, bare
+from data.csv.rows import Block, Rows, Tally, whole_rows
+from data.csv.text import ByteArray, open_text
 from data.elapsed import FINE, since_first_written
 from data.files import write_atomically
 from data.findings import LogError
@@ -55,17 +58,12 @@ def write_csv(
     for text in (*columns, *(metadata or {}).keys(), *(metadata or {}).values()):
         if not text.isprintable():
             raise LogError(f"{path.name}: {text!r} holds a control character and cannot stand in a CSV log")
-    head = "".join(f"# {key}: {value}\n" for key, value in (metadata or {}).items())
-    table = pd.DataFrame(dict(columns)).to_csv(index=False, lineterminator="\n")
-    write_atomically(path, head + table)
-
-
-# From pandas 3.1 on the default float parser is exact and the option is gone.
-_EXACT: Final[dict[str, str]] = (
-    {}
-    if tuple(int(part) for part in pd.__version__.split(".")[:2]) >= (3, 1)
-    else {"float_precision": "round_trip"}
-)
+    out = io.StringIO()
+    out.writelines(f"# {key}: {value}\n" for key, value in (metadata or {}).items())
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(columns)
+    table.writerows(zip(*(array.tolist() for array in columns.values()), strict=True))
+    write_atomically(path, out.getvalue())
 
 
 @dataclass(frozen=True)
@@ -74,37 +72,111 @@ class CsvTable:
 
     layout: CsvLayout
     values: dict[int, FloatArray]  # by column number; (n,) each
-    rows: Rows  # that they were read from, and what was taken out
+    rows: Rows  # what was kept of the file, and what was taken out
+    written: dict[int, pa.ChunkedArray]  # cells (n,) as text, of the columns whose text was asked for
+    reasons: dict[int, str]  # by column number: why it is no column of numbers
 
 
-def read_csv(content: bytes, layout: CsvLayout, wanted: Collection[int]) -> CsvTable:
-    """Read columns, by number from 0. Damaged rows are no error here: see `CsvTable.rows`.
+def read_csv(
+    content: bytes | ByteArray,
+    layout: CsvLayout,
+    wanted: Iterable[int],
+    *,
+    clocks: Iterable[int] = (),
+    strict: bool = True,
+) -> CsvTable:
+    """Read columns, by number from 0, in one pass. Damaged rows are no error here: see `CsvTable.rows`.
+
+    Parameters
+    ----------
+    content, layout
+        The file, and how it is written.
+    wanted
+        Columns of numbers.
+    clocks
+        Of them those whose cells are also kept as they are written, for `elapsed`.
+    strict
+        Whether a wanted column with a cell that is no number is an error; else it goes to `reasons`.
 
     Raises
     ------
     LogError
         When the file is no table, or a wanted cell is no number.
     """
-    rows = whole_rows(content, layout)
-    columns = sorted(set(wanted))
-    options = _options(rows, layout, columns)
-    try:
-        table = pd.read_csv(BytesIO(rows.text), dtype=np.float64, **options)
-    except pd.errors.ParserError as error:
-        raise LogError(f"a row does not have {layout.columns} cells ({shown(str(error).strip())})") from error
-    except (ValueError, OverflowError) as error:
-        raise LogError(_not_a_number(rows.text, layout, columns, options) or shown(str(error))) from error
+    columns, stamps = sorted(set(wanted)), frozenset(clocks)
+    parts: dict[int, list[FloatArray]] = {k: [] for k in columns}
+    texts: dict[int, list[pa.Array]] = {k: [] for k in columns if k in stamps}
+    reasons: dict[int, str] = {}
+    found = Tally()
+    for block in whole_rows(open_text(content, layout.encoding), layout, found):
+        if not block.rows:
+            continue
+        for k, cells in _columns(block, layout, list(parts)).items():
+            try:
+                parts[k].append(numbers(cells, layout.decimal))
+            except NotNumbersError as error:
+                reasons[k] = _no_number(layout, k, found.kept - block.rows + error.row, error)
+                if strict:
+                    raise LogError(reasons[k]) from error
+                del parts[k]
+                texts.pop(k, None)
+            else:
+                if k in texts:
+                    texts[k].append(cells)
     return CsvTable(
         layout=layout,
-        values={k: np.ascontiguousarray(table[k].to_numpy(np.float64)) for k in columns},
-        rows=rows,
+        values={k: np.concatenate(pieces) if pieces else np.zeros(0) for k, pieces in parts.items()},
+        rows=found.rows,
+        written={k: pa.chunked_array(pieces, pa.string()) for k, pieces in texts.items()},
+        reasons=reasons,
     )
 
 
-def table_integrity(table: CsvTable, *, rows: int) -> Integrity:
-    """What can be said of a table of so many rows; no table proves its content."""
+def _columns(block: Block, layout: CsvLayout, columns: Sequence[int]) -> dict[int, pa.Array]:
+    """Cells (n,) of columns of a block, as text."""
+    if not columns:
+        return {}
+    if block.cells is not None:
+        return {k: pa.array([row[k] for row in block.cells], pa.string()) for k in columns}
+    names = {k: str(k) for k in columns}
+    try:
+        table = arrow_csv.read_csv(
+            pa.BufferReader(block.text),
+            read_options=arrow_csv.ReadOptions(
+                column_names=[str(k) for k in range(layout.columns)],
+                use_threads=False,
+                block_size=len(block.text) + 1,
+            ),
+            parse_options=arrow_csv.ParseOptions(
+                delimiter=" " if layout.delimiter == "whitespace" else layout.delimiter,
+                quote_char=block.quote or False,
+            ),
+            convert_options=arrow_csv.ConvertOptions(
+                include_columns=list(names.values()),
+                column_types=dict.fromkeys(names.values(), pa.string()),
+                strings_can_be_null=False,
+                check_utf8=False,
+            ),
+        )
+    except pa.ArrowInvalid as error:
+        raise LogError(f"a row does not have {layout.columns} cells ({shown(str(error))})") from error
+    if table.num_rows != block.rows:
+        raise LogError(
+            f"{block.rows} rows were counted and {table.num_rows} read: the file cannot be trusted"
+        )
+    return {k: table[name].combine_chunks() for k, name in names.items()}
+
+
+def _no_number(layout: CsvLayout, column: int, row: int, error: NotNumbersError) -> str:
+    name = layout.headers[column] if layout.headers else str(column)
+    cell = shown(error.cell, 40)
+    return f"column {shown(name)!r} holds {cell!r} in row {row + 1} of the numbers: {error.why}"
+
+
+def table_integrity(table: CsvTable) -> Integrity:
+    """What can be said of a table; none proves its content."""
     found = table.rows
-    return Integrity("absent", losses=found.losses, messages=rows, notes=found.notes, counted="rows")
+    return Integrity("absent", losses=found.losses, messages=found.kept, notes=found.notes, counted="rows")
 
 
 def elapsed(table: CsvTable, column: int, *, begin: int = 0) -> FloatArray:
@@ -113,36 +185,31 @@ def elapsed(table: CsvTable, column: int, *, begin: int = 0) -> FloatArray:
     A stamp since 1970 as a float is good to 0.2 us at best. Where that is too coarse for the steps between
     rows, the difference is taken between the numbers as they are written.
     """
-    values: FloatArray = table.values[column][begin:]
+    return elapsed_together(table, (column,), begin=begin)[0]
+
+
+def elapsed_together(table: CsvTable, columns: Sequence[int], *, begin: int = 0) -> list[FloatArray]:
+    """Columns (n,) [as logged] from row `begin` on, minus the first's first number, exact to the text."""
+    values = [table.values[column][begin:] for column in columns]
+    if not any(np.isfinite(array).any() for array in values):
+        return values
+    if all(_fine(array) for array in values):
+        first = next(float(array[np.isfinite(array)][0]) for array in values if np.isfinite(array).any())
+        with np.errstate(over="ignore"):
+            return [array - first for array in values]
+    cells = [cell for column in columns for cell in table.written[column][begin:].to_pylist()]
+    since = since_first_written(cells, table.layout.decimal)
+    return np.split(since, len(columns))
+
+
+def _fine(values: FloatArray) -> bool:
+    """Whether numbers as floats are exact to a small part of the steps between them."""
     finite = values[np.isfinite(values)]
     if not finite.size:
-        return values
-    step = float(np.median(np.abs(np.diff(finite)))) if finite.size > 1 else 0.0
-    if np.spacing(np.abs(finite).max()) <= FINE * step:
-        fine: FloatArray = values - finite[0]
-        return fine
-    options = _options(table.rows, table.layout, [column])
-    text = BytesIO(table.rows.text)
-    cells = pd.read_csv(text, dtype=str, keep_default_na=False, **options)[column]
-    return since_first_written(cells.tolist()[begin:], table.layout.decimal)
-
-
-def _options(rows: Rows, layout: CsvLayout, columns: list[int]) -> dict[str, Any]:
-    """How pandas is to read some columns of the rows."""
-    return {
-        "sep": r"\s+" if layout.delimiter == "whitespace" else layout.delimiter,
-        "decimal": layout.decimal,
-        "encoding": rows.encoding,
-        "comment": layout.comment,
-        "header": None,
-        "names": list(range(layout.columns)),
-        "index_col": False,
-        "usecols": columns,
-        "skiprows": layout.first_row,
-        "skipinitialspace": True,
-        "engine": "c",
-        **_EXACT,
-    }
+        return True
+    with np.errstate(over="ignore"):
+        step = float(np.median(np.abs(np.diff(finite)))) if finite.size > 1 else 0.0
+        return bool(np.spacing(np.abs(finite).max()) <= FINE * step)
 
 
 def find_column(layout: CsvLayout, source: str | int) -> int:
@@ -175,19 +242,3 @@ def find_column(layout: CsvLayout, source: str | int) -> int:
     if not 0 <= number < layout.columns:
         raise LogError(f"no column number {number}; the log has {layout.columns}, counted from 0")
     return number
-
-
-def _not_a_number(text: bytes, layout: CsvLayout, columns: list[int], options: dict[str, Any]) -> str:
-    """Where the first wanted cell stands that is no number; empty when all are."""
-    cells = pd.read_csv(BytesIO(text), dtype=str, keep_default_na=False, **options)
-    for k in columns:
-        column = cells[k].str.strip().str.replace(layout.decimal, ".")
-        bad = pd.to_numeric(
-            column.where(column != "", "nan"), errors="coerce"
-        ).isna() & ~column.str.lower().isin(["", "nan", "+nan", "-nan", "na", "n/a", "null", "none"])
-        if bad.any():
-            row = int(np.argmax(bad.to_numpy()))
-            name = layout.headers[k] if layout.headers else str(k)
-            cell = shown(str(cells[k].iloc[row]), 40)
-            return f"column {shown(name)!r} holds {cell!r} in row {row + 1} of the numbers: no number"
-    return ""

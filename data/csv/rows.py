@@ -1,235 +1,339 @@
 """Which rows of a CSV file can be trusted to hold what the rig wrote.
 
-Three things go wrong with rows while every single number still parses. A cell is lost or won, so that the
+Four things go wrong with rows while every single number still parses. A cell is lost or won, so that the
 numbers behind it stand in other columns. A cell such as `#N/A` opens a row, so that the row passes for a
-comment. The recording stops in the middle of a line, so that its last number is cut: `0.4210` is a number,
-and so are `0.42` and `0`. Such rows are taken out and named; what remains are whole rows.
+comment. A quotation mark opens and is not closed, so that rows hide in a cell. The recording stops in the
+middle of a line (see `data.csv.cut_line`). Such rows are taken out and named; what remains are whole rows,
+and the place of each that is missing is kept, for nothing may be interpolated across it.
 
-A last line without a line end is common and mostly whole. It counts as cut when a cell is missing or its last
-cell cannot be one of the column's: too few decimals among numbers that all have the same, or an open end
-like `0.` or `1e-`. Where decimals vary, a last number shorter than is usual may be cut or may be right; its
-row is left out and that is said, which costs one sample.
+Rows are found block by block: in a block without quotation marks all at once, in one with them line by line.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
-from statistics import median
-from typing import Final, Literal
+from dataclasses import dataclass, field
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from data.csv.dialect import CsvLayout, numeric_share, split
+from data.csv.cells import BLANKS, is_number, numeric_share, split
+from data.csv.cut_line import cut_line
+from data.csv.layout import CsvLayout
+from data.csv.records import MOST_JOINED, joined
+from data.csv.text import BLOCK, Text, line_bounds, lines, utf8
 from data.findings import LogError
 from data.integrity import Loss
 from data.names import shown
 
 _MOST_LOSSES: Final = 1000  # rows, after which the file is no table
-_NEIGHBOURS: Final = 200  # rows above the last that it is compared with
-_DISTINCT: Final = 10  # cells among them that prove a number format
-_LONG: Final = 8  # decimals, from which on one or two fewer change nothing
-_CELL: Final = re.compile(r"[+-]?(\d*)(?:[.,](\d*))?(?:[eE][+-]?(\d*))?")
-_LINE_END: Final = re.compile(rb"\r\n|\n|\r")
-_Shape = tuple[int, int, int]  # digits before the decimal sign, behind it, in the exponent; -1: no such part
+_Verdict = tuple[str, str]  # what to do with a line, and why: keep, blank, comment, hidden, empty, lost
 
 
 @dataclass(frozen=True)
 class Rows:
-    """A file's whole rows, below the lines that stand above the numbers."""
+    """What became of a file's rows."""
 
-    text: bytes
-    encoding: str
+    kept: int
     losses: tuple[Loss, ...]  # rows that were taken out because they are damaged
     notes: tuple[str, ...]  # rows that were left out for another reason
+    breaks: tuple[int, ...]  # kept rows at which another part begins, since rows before them are missing
+
+
+@dataclass
+class Tally:
+    """What a walk through the rows has found so far."""
+
+    kept: int = 0
+    losses: list[Loss] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    missing_before: list[int] = field(default_factory=list)  # kept rows before which others are missing
+
+    @property
+    def rows(self) -> Rows:
+        """The same once the walk is over."""
+        places = {place for place in self.missing_before if 0 < place < self.kept}
+        return Rows(self.kept, tuple(self.losses), tuple(self.notes), tuple(sorted(places)))
 
 
 @dataclass(frozen=True)
-class _Line:
-    """One line of the text."""
+class Block:
+    """Whole rows that stand one after the other."""
 
-    number: int  # from 1
-    begin: int  # [bytes]
-    end: int  # [bytes], past its line end
-    text: str
+    text: bytes  # one row a line in UTF-8; empty where `cells` holds the rows
+    cells: list[list[str]] | None
+    rows: int
+    quote: str = ""  # around cells of `text`
 
 
-def whole_rows(content: bytes, layout: CsvLayout) -> Rows:
-    """The rows that hold as many cells as the numbers have columns, and no cut number.
+@dataclass
+class _Place:
+    """Where the walk is."""
+
+    byte: int
+    line: int  # counted from 0
+
+
+def whole_rows(text: Text, layout: CsvLayout, found: Tally) -> Iterator[Block]:
+    """The rows that hold as many cells as the numbers have columns, and no cut number, block by block.
+
+    What is left out is added to `found`.
 
     Raises
     ------
     LogError
         When so many rows differ that the file is no table.
     """
-    text, encoding = content, layout.encoding
-    if encoding.startswith("utf-16"):  # bytes can only be searched where a character is one
-        text, encoding = content.decode(encoding, errors="replace").encode(), "utf-8"
-    top = _top(text, layout.first_row)
-    end, losses, notes = _without_cut_line(text, top, encoding=encoding, layout=layout)
-    odd, commented = _odd_lines(text[:end], top, encoding=encoding, layout=layout)
-    if len(odd) > _MOST_LOSSES:
-        raise LogError(f"{odd[0][1]}. So do {len(odd) - 1} more lines: is it a table?")
-    if commented:
-        notes.append(f"{commented} rows of numbers are commented out and were not read")
-    pieces, here = [], 0
-    for line, _ in odd:
-        pieces.append(text[here : line.begin])
-        here = line.end
-    found = [*((line.begin, line.end, why) for line, why in odd), *losses]
-    return Rows(
-        text=b"".join((*pieces, text[here:end])),
-        encoding=encoding,
-        losses=tuple(_loss(text, layout, begin, stop, why) for begin, stop, why in found),
-        notes=tuple(notes),
-    )
-
-
-def _loss(text: bytes, layout: CsvLayout, begin: int, end: int, why: str) -> Loss:
-    """A loss by its bytes in the file as it is."""
-    if layout.encoding.startswith("utf-16"):
-        begin, end = (len(text[:place].decode().encode(layout.encoding)) for place in (begin, end))
-    return Loss(begin, end, why)
-
-
-def _top(text: bytes, lines: int) -> int:
-    """Where the first row of numbers begins [bytes]."""
-    here = 0
-    for _ in range(lines):
-        found = _LINE_END.search(text, here)
-        here = found.end() if found else len(text)
-    return here
-
-
-def _odd_lines(
-    text: bytes, top: int, *, encoding: str, layout: CsvLayout
-) -> tuple[list[tuple[_Line, str]], int]:
-    """Lines that are no rows with why, and how many rows are commented out."""
-    odd: list[tuple[_Line, str]] = []
-    commented = 0
-    for line in _suspects(text, top, encoding=encoding, layout=layout):
-        cells = split(line.text, layout.delimiter)
-        if not line.text.strip():
+    top = _Place(*_top(text, layout))
+    end, losses, notes = cut_line(text, layout, top=top.byte)
+    walk = _Walk(text, layout, found, top)
+    size = BLOCK
+    while walk.place.byte < end:
+        content, past = text.block(walk.place.byte, size)
+        if past > end:  # the cut line is the last, and a block ends with it
+            content = content[: len(content) - _size(text, end, past)]
+            past = end
+        taken = walk.take(content, past=past, last=past >= end)
+        if taken is None:
+            size *= 2
             continue
-        if layout.comment and line.text.lstrip().startswith(layout.comment):
-            if len(cells) != layout.columns or numeric_share(cells[1:], layout.decimal) < 0.5:
-                continue
-            if numeric_share([cells[0].lstrip(layout.comment).strip()], layout.decimal) == 1.0:
-                commented += 1
-                continue
-            odd.append(
-                (
-                    line,
-                    f"line {line.number} begins with {shown(cells[0], 30)!r}, which reads like a comment, "
-                    "but a row of numbers follows: a sample would be lost unseen",
-                )
+        size = BLOCK
+        yield taken
+    found.losses += losses
+    found.notes += notes
+    if walk.hidden:
+        found.notes.append(f"{walk.hidden} rows of numbers are commented out and were not read")
+    if walk.empty:
+        found.notes.append(f"{walk.empty} rows hold no cell and were left out")
+    if text.end < text.content.size and text.content.size - text.end > text.width - 1:
+        zeros = text.content.size - text.end
+        found.losses.append(
+            Loss(
+                text.end, text.content.size, f"{zeros} zero bytes at the end were never written: a power loss"
             )
-        elif len(cells) != layout.columns:
-            before = line.text.partition(layout.comment)[0] if layout.comment else line.text
-            if before != line.text and len(split(before, layout.delimiter)) == layout.columns:
-                continue  # a comment behind the numbers
-            odd.append(
-                (
-                    line,
-                    f"line {line.number} has {len(cells)} cells, the others {layout.columns}; a lost cell "
-                    "would shift the numbers behind it into other columns",
-                )
-            )
-    return odd, commented
+        )
 
 
-def _suspects(text: bytes, top: int, *, encoding: str, layout: CsvLayout) -> Iterator[_Line]:
-    """Lines below `top` with an unusual number of delimiters, or that may be comments."""
-    body = np.frombuffer(text, np.uint8)[top:]
-    if not body.size:
-        return
-    is_end = body == ord("\n")
-    returns = body == ord("\r")
-    if returns.any():
-        is_end |= returns & ~np.append(body[1:] == ord("\n"), False)
-    ends = np.flatnonzero(is_end) + 1
-    begins = np.concatenate(([0], ends[ends < body.size]))
-    stops = np.append(begins[1:], body.size)
-    if layout.delimiter == "whitespace":
-        blank = (body == ord(" ")) | (body == ord("\t")) | is_end | returns
-        mark = ~blank & np.concatenate(([True], blank[:-1]))
-        usual = layout.columns
-    else:
-        mark = body == ord(layout.delimiter)
+def _size(text: Text, begin: int, end: int) -> int:
+    """Bytes of a block that a part of the file takes."""
+    raw = text.content[begin:end].tobytes()
+    return len(raw) if text.width == 1 else len(utf8(raw, text.codec))
+
+
+def _top(text: Text, layout: CsvLayout) -> tuple[int, int]:
+    """The byte at which the first row of numbers begins, and its line."""
+    byte, number = text.begin, 0
+    while number < layout.first_row and byte < text.end:
+        content, past = text.block(byte)
+        for line in lines(content)[: layout.first_row - number]:
+            byte += text.size_of(line)
+            number += 1
+        if number < layout.first_row:
+            byte = past
+    return byte, number
+
+
+@dataclass
+class _Walk:
+    """Takes blocks apart, one after the other."""
+
+    text: Text
+    layout: CsvLayout
+    found: Tally
+    place: _Place
+    hidden: int = 0
+    empty: int = 0
+
+    def take(self, content: bytes, *, past: int, last: bool) -> Block | None:
+        """The rows of a block; None when a quoted cell goes on behind it."""
+        quote = self.layout.quote
+        if not quote or quote.encode() not in content:
+            block = self._unquoted(content)
+            self.place = _Place(past, self.place.line)
+            return block
+        return self._regular(content, past=past) or self._quoted(content, past=past, last=last)
+
+    def _regular(self, content: bytes, *, past: int) -> Block | None:
+        """A block in which every line is a row, quotes and all; None where one is not, or may not be."""
+        layout = self.layout
+        signs = [
+            "\0",
+            layout.comment or "\0",
+            f" {layout.quote}",
+        ]  # behind a blank, a quote is no first character
+        if layout.delimiter != "\t":
+            signs.append(f"\t{layout.quote}")
+        if layout.delimiter == "whitespace" or any(sign.encode() in content for sign in signs):
+            return None
+        begins, stops = line_bounds(content)
+        body = np.frombuffer(content, np.uint8)
+        quotes = body == ord(layout.quote)
+        outside = np.cumsum(quotes, dtype=np.uint8) & 1 == 0  # wraps at an even number
+        mark = (body == ord(layout.delimiter)) & outside
         usual = layout.columns - 1
-    unusual = np.add.reduceat(mark, begins, dtype=np.int64) != usual
-    if layout.comment and layout.comment.encode() in text[top:]:
-        unusual |= np.isin(body[begins], [ord(layout.comment), ord(" "), ord("\t")])
-    for k in np.flatnonzero(unusual).tolist():
-        begin, stop = top + int(begins[k]), top + int(stops[k])
-        words = text[begin:stop].decode(encoding, errors="replace").rstrip("\r\n")
-        yield _Line(layout.first_row + k + 1, begin, stop, words)
+        rows = np.add.reduceat(mark, begins, dtype=np.int32) == usual
+        rows &= (np.add.reduceat(quotes, begins, dtype=np.int32) % 2 == 0) & (stops - begins > usual + 2)
+        if not rows.all():
+            return None
+        self.place = _Place(past, self.place.line + begins.size)
+        self.found.kept += begins.size
+        return Block(utf8(content, self.text.codec_of_block), None, begins.size, layout.quote)
 
+    def _unquoted(self, content: bytes) -> Block:
+        begins, stops = line_bounds(content)
+        suspects = np.flatnonzero(self._suspect(content, begins, stops)).tolist()
+        pieces, here, dropped = [], 0, 0
+        before = self.found.kept
+        for k in suspects:
+            begin, stop = int(begins[k]), int(stops[k])
+            do, why = self.verdict(self._decoded(content[begin:stop]), self.place.line + k)
+            if do == "keep" and not why:
+                continue
+            pieces.append(content[here:begin])
+            here = stop
+            if do == "keep":  # without the comment behind it
+                pieces.append(why.encode(self.text.codec_of_block, errors="replace") + b"\n")
+                continue
+            self._left_out(do, why, content, begin, stop, before=before + k - dropped)
+            dropped += 1
+        kept = begins.size - dropped
+        self.place.line += begins.size
+        self.found.kept += kept
+        text = utf8(b"".join((*pieces, content[here:])), self.text.codec_of_block)
+        if self.layout.delimiter == "whitespace":
+            text = b"\n".join(b" ".join(line.split()) for line in lines(text))
+        return Block(text, None, kept)
 
-def _without_cut_line(
-    text: bytes, top: int, *, encoding: str, layout: CsvLayout
-) -> tuple[int, list[tuple[int, int, str]], list[str]]:
-    """Where the whole lines end [bytes]; the cut line as a loss, or the doubt about it as a note."""
-    size = len(text)
-    begin = max(text.rfind(b"\n"), text.rfind(b"\r")) + 1
-    last = text[begin:].decode(encoding, errors="replace")
-    if begin == size or begin < top or not last.strip():
-        return size, [], []
-    cells = split(last, layout.delimiter)
-    if len(cells) < layout.columns:
-        return begin, [(begin, size, "the last line is cut off")], []
-    if last.count('"') % 2:
-        return begin, [(begin, size, "the last line is cut off inside quotes")], []
-    if len(cells) > layout.columns or last.rstrip().endswith('"'):
-        return size, [], []
-    above = text[max(top, begin - (1 << 16)) : begin].decode(encoding, errors="replace").splitlines()
-    rows = [split(line, layout.delimiter) for line in above[-_NEIGHBOURS:]]
-    state = _state(cells[-1], [row[-1] for row in rows if len(row) == layout.columns])
-    if state == "whole":
-        return size, [], []
-    seen = f"the last line has no line end and stops at {shown(cells[-1], 30)!r}"
-    if state == "cut":
-        return begin, [(begin, size, f"{seen}: its last number is cut off")], []
-    return begin, [], [f"{seen}, shorter than the numbers above it: it may be cut off and was left out"]
+    def _suspect(
+        self, content: bytes, begins: NDArray[np.intp], stops: NDArray[np.intp]
+    ) -> NDArray[np.bool_]:
+        """Lines (n,) with an unusual number of cells, or none, or that may be comments or damaged."""
+        layout = self.layout
+        body = np.frombuffer(content, np.uint8)
+        if layout.delimiter == "whitespace":
+            blank = np.isin(body, [ord(sign) for sign in BLANKS + "\r\n"])
+            mark = ~blank
+            mark[1:] &= blank[:-1]
+            mark[begins] = ~blank[begins]
+            usual = layout.columns
+        else:
+            mark = body == ord(layout.delimiter)
+            usual = layout.columns - 1
+        odd = np.add.reduceat(mark, begins, dtype=np.int32) != usual
+        odd |= stops - begins <= usual + 2  # only delimiters
+        if layout.columns == 1:
+            odd |= np.isin(body[begins], [ord(sign) for sign in BLANKS])
+        for sign in (layout.comment, "\0"):
+            if sign and sign.encode() in content:
+                at = [match.start() for match in re.finditer(re.escape(sign.encode()), content)]
+                odd[np.searchsorted(begins, at, side="right") - 1] = True
+        return np.asarray(odd, np.bool_)
 
+    def _quoted(self, content: bytes, *, past: int, last: bool) -> Block | None:
+        quote = self.layout.quote
+        raw = lines(content)
+        texts = [self._decoded(line) for line in raw]
+        sizes = np.concatenate(([0], np.cumsum([len(line) for line in raw])))
+        cells: list[list[str]] = []
+        before, k = self.found.kept, 0
+        while k < len(raw):
+            stop = k + 1
+            line = texts[k]
+            if line.count(quote) % 2 and not self._is_comment(line):
+                stop = joined(texts, k, quote)
+                if stop == k + 1 and not last and len(raw) - k <= MOST_JOINED:
+                    if k == 0:
+                        return None
+                    break  # the cell may be closed in the next block
+                if stop > k + 1 and self._hides_rows(texts[k + 1 : stop - 1], " ".join(texts[k:stop])):
+                    stop = k + 1
+            row, do, why = self._row(" ".join(texts[k:stop]), self.place.line + k)
+            if do == "keep":
+                cells.append(row)
+            else:
+                begin, end = int(sizes[k]), int(sizes[stop])
+                self._left_out(do, why, content, begin, end, before=before + len(cells))
+            k = stop
+        size = int(sizes[k])
+        self.place = _Place(
+            past if k == len(raw) else self.place.byte + self.text.size_of(content[:size]),
+            self.place.line + k,
+        )
+        self.found.kept += len(cells)
+        return Block(b"", cells, len(cells))
 
-def _state(cell: str, above: list[str]) -> Literal["whole", "doubtful", "cut"]:
-    """Whether a last cell without a line end is one of its column, whose cells stand above it."""
-    shapes = [shape for other in above if (shape := _shape(other)) is not None]
-    if cell in above or not above:
-        return "whole"
-    if 2 * len(shapes) < len(above):  # words
-        return "doubtful" if len(cell) < min(len(other) for other in above) else "whole"
-    own = _shape(cell)
-    if own is None:
-        return "cut"
-    return _number_state(own, shapes, distinct=len(set(above)))
+    def _row(self, line: str, number: int) -> tuple[list[str], str, str]:
+        """The cells of a record, what to do with it, and why."""
+        try:
+            do, why = self.verdict(line, number)
+            cells = split(why or line, self.layout.delimiter, self.layout.quote) if do == "keep" else []
+        except LogError as error:
+            return [], "lost", f"line {number + 1}: {error}"
+        return cells, do, why
 
+    def _hides_rows(self, inner: list[str], record: str) -> bool:
+        """Whether lines inside a quoted cell are rows themselves, or the cell makes no row."""
+        layout = self.layout
+        if len(split(record, layout.delimiter, layout.quote)) != layout.columns:
+            return True
+        rows = [split(line, layout.delimiter, "") for line in inner]
+        return layout.columns > 1 and any(
+            len(row) == layout.columns and numeric_share(row, layout.decimal) >= 0.5 for row in rows
+        )
 
-def _number_state(own: _Shape, above: list[_Shape], *, distinct: int) -> Literal["whole", "doubtful", "cut"]:
-    """The same for a number, of which `distinct` different ones stand above."""
-    digits, decimals, exponent = (sorted(column) for column in zip(*above, strict=True))
-    open_end = (own[1] == 0 and 0 not in decimals) or own[2] == 0 or own == (0, -1, -1)
-    if open_end or own[2] < exponent[0]:  # `0.`, `1e-`, `-`; or each of the others has an exponent
-        return "cut"
-    if own[2] >= 0:
-        return "whole"
-    if decimals[-1] < 0:  # integers
-        return "doubtful" if own[0] < digits[0] else "whole"
-    if decimals[0] == decimals[-1] and distinct >= _DISTINCT:
-        return "cut" if own[1] < decimals[0] else "whole"
-    usual = median(decimals)
-    return "doubtful" if own[1] < usual - 2 * (usual > _LONG) else "whole"
+    def _decoded(self, line: bytes) -> str:
+        return line.decode(self.text.codec_of_block, errors="replace").rstrip("\r\n")
 
+    def _is_comment(self, line: str) -> bool:
+        return bool(self.layout.comment) and line.lstrip().startswith(self.layout.comment or "")
 
-def _shape(cell: str) -> _Shape | None:
-    """The shape of a number; None: it is none."""
-    found = _CELL.fullmatch(cell)
-    if found is None:
-        return None
-    return (
-        len(found[1]),
-        -1 if found[2] is None else len(found[2]),
-        -1 if found[3] is None else len(found[3]),
-    )
+    def verdict(self, line: str, number: int) -> _Verdict:
+        """What to do with a line (its number from 0), and why; a line kept in part comes in place of why."""
+        layout = self.layout
+        if not line.strip(BLANKS):
+            return "blank", ""
+        if "\0" in line:
+            return "lost", f"line {number + 1} holds zero bytes, which were never written"
+        cells = split(line, layout.delimiter, layout.quote)
+        if self._is_comment(line):
+            return self._comment(cells, number)
+        if layout.comment and layout.comment in line:
+            part = line.partition(layout.comment)[0]
+            whole = part.count(layout.quote or '"') % 2 == 0
+            if whole and len(split(part, layout.delimiter, layout.quote)) == layout.columns:
+                return "keep", part
+        if len(cells) != layout.columns:
+            why = "a lost cell would shift the numbers behind it into other columns"
+            if layout.quote and line.count(layout.quote) % 2:
+                why = "a quotation mark in it is never closed, or stands inside a cell"
+            return "lost", f"line {number + 1} has {len(cells)} cells, the others {layout.columns}; {why}"
+        return ("keep", "") if any(cells) else ("empty", "")
+
+    def _comment(self, cells: list[str], number: int) -> _Verdict:
+        """What a comment hides."""
+        layout, mark = self.layout, self.layout.comment or ""
+        if len(cells) != layout.columns or numeric_share(cells[1:], layout.decimal) < 0.5:
+            return "comment", ""
+        if is_number(cells[0].lstrip(mark).strip(), layout.decimal):
+            return "hidden", ""
+        return "lost", (
+            f"line {number + 1} begins with {shown(cells[0], 30)!r}, which reads like a comment, "
+            "but a row of numbers follows: a sample would be lost unseen"
+        )
+
+    def _left_out(self, do: str, why: str, content: bytes, begin: int, end: int, *, before: int) -> None:
+        """Note a line that is no row, before which `before` rows were kept."""
+        if do in {"hidden", "empty", "lost"}:
+            self.found.missing_before.append(before)
+        self.hidden += do == "hidden"
+        self.empty += do == "empty"
+        if do != "lost":
+            return
+        start = self.place.byte + self.text.size_of(content[:begin])
+        self.found.losses.append(Loss(start, start + self.text.size_of(content[begin:end]), why))
+        if len(self.found.losses) > _MOST_LOSSES:
+            raise LogError(
+                f"{self.found.losses[0].why}. So do over {_MOST_LOSSES - 1} more lines: is it a table?"
+            )

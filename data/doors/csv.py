@@ -2,58 +2,62 @@
 
 from __future__ import annotations
 
-from data.began import began
-from data.csv.description import TIME_NAMES
-from data.csv.dialect import bare, sniff
+import numpy as np
+
+from data.began import began, since_1970
+from data.csv.clocks import clocks_of, on_clock, time_column
+from data.csv.dialect import sniff
 from data.csv.log import elapsed, find_column, read_csv, table_integrity
-from data.doors.door import Door, Logged, interval, require_unit, unset
+from data.doors.door import Door, Logged, after_first, interval, require_unit, unset
 from data.elapsed import unset_lead
-from data.findings import LogError
+from data.findings import Finding, LogError, Severity
 from data.mcap.records import ByteArray
 from data.names import shown
 from data.signals import Signal
 
 
 def read_csv_log(door: Door, content: ByteArray) -> Logged:
-    """The wanted columns of a CSV file in SI; raises LogError."""
-    raw = content.tobytes()
+    """The wanted columns of a CSV file in SI, on the clock of the position's column; raises LogError."""
     try:
-        layout = sniff(raw, door.signals.dialect)
+        layout = sniff(content, door.signals.dialect)
         wanted = door.wanted()
-        time = door.signals.time or _plain_time(layout.headers, layout.units)
-        columns = {quantity: find_column(layout, signal.source) for quantity, signal in wanted.items()}
-        columns["time"] = find_column(layout, time.source)
-        for quantity, signal in {**wanted, "time": time}.items():
+        columns: dict[str, int] = {
+            quantity: find_column(layout, signal.source) for quantity, signal in wanted.items()
+        }
+        asked = door.signals.time
+        column = time_column(layout, asked.source if asked else None, columns["position"])
+        time = asked or Signal(column, unit=layout.units[column])
+        clocks = clocks_of(layout, columns, column)
+        for quantity, signal in wanted.items():
             require_unit(quantity, signal, layout.units[columns[quantity]], axis=door.axis)
-        table = read_csv(raw, layout, columns.values())
+        for clock in {column, *clocks.values()}:
+            require_unit("time", time, layout.units[clock], axis=door.axis)
+        stamped = {column, *clocks.values()}
+        table = read_csv(content, layout, {*columns.values(), *stamped}, clocks=stamped)
+        findings = table_integrity(table).require(door.log, salvage=door.salvage)
+        one = float(door.convert("time", interval(time), np.ones(1))[0])
+        read = on_clock(table, columns, clocks, seconds=one)
     except LogError as error:
-        text = str(error)
-        raise LogError(text if text.startswith(door.log) else f"{door.log}: {text}") from error
-    values = {quantity: table.values[column] for quantity, column in columns.items()}
-    integrity = table_integrity(table, rows=values["time"].size)
-    findings = integrity.require(door.log, salvage=door.salvage)
-    name = layout.headers[columns["time"]] if layout.headers else str(columns["time"])
-    clock = f"column {shown(name)!r}"
-    stamps = door.convert("time", interval(time), values.pop("time"))
+        said = str(error)
+        raise LogError(said if said.startswith(door.log) else f"{door.log}: {said}") from error
+    name = f"column {shown(layout.headers[column] if layout.headers else str(column))!r}"
+    stamps = door.convert("time", interval(time), table.values[column][: read.rows])
     lead = unset_lead(stamps)
-    return Logged(
-        time=door.convert("time", interval(time), elapsed(table, columns["time"], begin=lead)),
+    held = tuple(
+        Finding("E-CLOCK", Severity.WARN, f"{quantity} {text}", door.log)
+        for quantity, text in read.held.items()
+    )
+    begin = since_1970(float(stamps[lead]), time.unit) if stamps.size > lead else 0.0
+    logged = Logged(
+        time=door.convert("time", interval(time), elapsed(table, column, begin=lead)[: read.rows - lead]),
         signals={
-            quantity: door.convert(quantity, wanted[quantity], values[quantity][lead:]) for quantity in wanted
+            quantity: door.convert(quantity, signal, read.values[quantity][lead:])
+            for quantity, signal in wanted.items()
         },
-        clock=clock,
+        clock=name,
         metadata=layout.metadata,
-        findings=(*findings, *unset(door, lead, clock)),
-        begun=began(float(stamps[lead]) if stamps.size > lead else 0.0, layout.metadata),
+        findings=(*findings, *held, *unset(door, lead, name)),
+        begun=began(begin, layout.metadata),
+        breaks=tuple(place - lead for place in table.rows.breaks if lead < place < read.rows),
     )
-
-
-def _plain_time(headers: tuple[str, ...], units: tuple[str | None, ...]) -> Signal:
-    """The column that is plainly the time, with the unit that its header declares."""
-    for k, header in enumerate(headers):
-        if bare(header).lower() in TIME_NAMES:
-            return Signal(k, unit=units[k] if units[k] else None)
-    raise LogError(
-        "[signals] names no time for csv logs, and no column is plainly the time "
-        f'(one of {", ".join(TIME_NAMES)}); add time = {{ csv = "..." }}'
-    )
+    return after_first(logged) if held else logged

@@ -27,6 +27,7 @@ class Logged:
     metadata: Mapping[str, str]
     findings: tuple[Finding, ...]
     begun: float | None  # from 1970 [s]
+    breaks: tuple[int, ...] = ()  # samples before which others are lost
 
 
 @dataclass(frozen=True)
@@ -93,4 +94,29 @@ def require_unit(quantity: Quantity, signal: Signal, declared: str | None, *, ax
         f"E-UNIT refuse: the log declares {quantity} in {declared!r}, but {source} {stated!r}; every "
         f"parameter drawn from it would be wrong by their ratio. If the log is right, set "
         f'unit = "{declared}" on {quantity}'
+    )
+
+
+def after_first(logged: Logged) -> Logged:
+    """The run from where every signal has had its first message.
+
+    A reference that has not been sent yet stands at its first value: nothing else is known of it.
+    """
+    signals = dict(logged.signals)
+    if "reference" in signals:
+        reference = signals["reference"]
+        known = np.flatnonzero(~np.isnan(reference))
+        if known.size:
+            signals["reference"] = np.where(
+                np.arange(reference.size) < known[0], reference[known[0]], reference
+            )
+    held = [signals[quantity] for quantity in ("torque", "velocity") if quantity in signals]
+    late = max((int(np.argmax(~np.isnan(array))) for array in held if np.isnan(array[0])), default=0)
+    if late == 0:
+        return replace(logged, signals=signals)
+    return replace(
+        logged,
+        time=logged.time[late:],
+        signals={quantity: array[late:] for quantity, array in signals.items()},
+        breaks=tuple(place - late for place in logged.breaks if place > late),
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Protocol
 
@@ -14,7 +13,7 @@ from data.alignment import align
 from data.bag.columns import read_columns as read_bag_columns
 from data.began import began
 from data.clocks import drift
-from data.doors.door import Door, FloatArray, Logged, interval, unset
+from data.doors.door import Door, FloatArray, Logged, after_first, interval, unset
 from data.elapsed import since_first, unset_lead
 from data.findings import Finding, LogError, Severity
 from data.integrity import Integrity
@@ -83,8 +82,9 @@ def _read(door: Door, columns: _Columns, surveyed: Callable[[], Integrity]) -> L
     findings += unset(door, lead, name)
     signals = {quantity: values[lead:] for quantity, values in signals.items()}
     begun = began(float(clock[lead]) / 1e9, read.metadata)
-    logged = Logged(seconds, signals, name, read.metadata, tuple(findings), begun)
-    return _after_first(logged)
+    lost = tuple(place - lead for place in read.integrity.breaks(topic.log_time) if place > lead)
+    logged = Logged(seconds, signals, name, read.metadata, tuple(findings), begun, breaks=lost)
+    return after_first(logged)
 
 
 def _clock(door: Door, topic: Topic) -> tuple[NDArray[np.int64], str, tuple[Finding, ...]]:
@@ -146,28 +146,4 @@ def _on_clock(
         f"between its messages, {aligned.longest_hold / period:.0f} position samples"
         if period > 0.0
         else "is on another clock"
-    )
-
-
-def _after_first(logged: Logged) -> Logged:
-    """The run from where every signal has had its first message.
-
-    A reference that has not been sent yet stands at its first value: nothing else is known of it.
-    """
-    signals = dict(logged.signals)
-    if "reference" in signals:
-        reference = signals["reference"]
-        known = np.flatnonzero(~np.isnan(reference))
-        if known.size:
-            signals["reference"] = np.where(
-                np.arange(reference.size) < known[0], reference[known[0]], reference
-            )
-    held = [signals[quantity] for quantity in ("torque", "velocity") if quantity in signals]
-    late = max((int(np.argmax(~np.isnan(array))) for array in held if np.isnan(array[0])), default=0)
-    if late == 0:
-        return replace(logged, signals=signals)
-    return replace(
-        logged,
-        time=logged.time[late:],
-        signals={quantity: array[late:] for quantity, array in signals.items()},
     )

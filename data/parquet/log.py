@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from data.csv.dialect import bare, declared_unit
+from data.csv.layout import bare, declared_unit
 from data.findings import LogError
 from data.integrity import Checksums, Integrity, Loss
 from data.mcap.records import ByteArray

@@ -13,8 +13,6 @@ from data.protocols import IDENTIFIES
 from data.screening.run import FloatArray, Run, warning
 
 # Protocols of which each part of a split run says something by itself.
-
-# Protocols of which each part of a split run says something by itself.
 TAKEN_APART: Final = frozenset({"breakaway", "constant_velocity", "excitation"})
 FEWEST_SAMPLES: Final = 10
 GAP: Final = 3.0  # median steps
@@ -39,15 +37,40 @@ def advance(run: Run, clock: str) -> tuple[Run, tuple[Finding, ...]]:
             f"{FEWEST_SAMPLES} samples, so that no speed can be told, and nothing of "
             f"{IDENTIFIES[run.protocol]}. Choose another `clock` or time signal, or record it again"
         )
-    mended = replace(run.taken(found.kept), time=found.time, breaks=found.breaks)
+    lost = {int(np.argmax(found.kept >= place)) for place in run.breaks if place <= found.kept.max()}
+    breaks = tuple(sorted({*found.breaks, *lost} - {0}))
+    mended = replace(run.taken(found.kept), time=found.time, breaks=breaks)
     done = [*_said(found)]
     if found.breaks and run.protocol not in TAKEN_APART:
-        edges = np.array([0, *found.breaks, found.kept.size])
+        edges = np.array([0, *breaks, found.kept.size])
         longest = int(np.argmax(np.diff(edges)))
         mended = mended.taken(np.arange(edges[longest], edges[longest + 1]))
         done.append(f"of its parts only the longest is used, from t = {mended.time[0]:.6g} s")
     _require_one_epoch(mended, np.diff(mended.time), clock)
     return mended, (warning("E-CLOCK", f"{seen}; {'; '.join(done)}", run),)
+
+
+def long_parts(run: Run) -> tuple[Run, tuple[Finding, ...]]:
+    """E-GAP: a run of which samples were lost, without the parts that are too short to say anything."""
+    if not run.breaks:
+        return run, ()
+    sizes = np.diff([0, *run.breaks, run.time.size])
+    kept = sizes >= FEWEST_SAMPLES
+    if run.protocol not in TAKEN_APART:
+        kept &= np.arange(sizes.size) == np.argmax(sizes)
+    if kept.all():
+        return run, ()
+    samples = np.repeat(kept, sizes)
+    if not samples.any():
+        raise LogError(
+            f"{run.log}: E-GAP refuse: what is lost leaves no part of the run with {FEWEST_SAMPLES} samples, "
+            f"so that no speed can be told, and nothing of {IDENTIFIES[run.protocol]}. Exclude the log"
+        )
+    text = (
+        f"what is lost takes the run apart; {np.count_nonzero(kept)} of its {sizes.size} parts are used, "
+        f"{np.count_nonzero(~samples)} samples in the others left out"
+    )
+    return run.keep(samples), (warning("E-GAP", text, run),)
 
 
 def _said(found: Advancing) -> list[str]:

@@ -41,7 +41,8 @@ class Run:
     def keep(self, samples: BoolArray) -> Run:
         """The same run with some samples only."""
         before = np.concatenate(([0], np.cumsum(samples)))
-        breaks = tuple(int(before[k]) for k in self.breaks)
+        places = sorted({int(before[k]) for k in self.breaks})
+        breaks = tuple(place for place in places if 0 < place < before[-1])
         return replace(self.taken(np.flatnonzero(samples)), breaks=breaks)
 
     def taken(self, samples: IndexArray) -> Run:

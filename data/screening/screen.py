@@ -8,7 +8,7 @@ import numpy as np
 
 from data.findings import Finding, LogError
 from data.protocols import IDENTIFIES
-from data.screening.clock import FEWEST_SAMPLES, advance, gaps
+from data.screening.clock import FEWEST_SAMPLES, advance, gaps, long_parts
 from data.screening.position import drop_spikes, unwrap
 from data.screening.run import Run
 from data.screening.scale import require_sizes, require_torque_size, require_velocity_unit
@@ -47,6 +47,7 @@ def screen(run: Run, *, clock: str, resolution: float | None, torque_limit: floa
     require_sizes(run)
     require_samples(run)
     run, clocks = advance(run, clock)
+    run, lost = long_parts(run)
     run, wraps = unwrap(run, resolution)
     run, spikes = drop_spikes(run, resolution)
     require_velocity_unit(run, resolution)
@@ -54,7 +55,7 @@ def screen(run: Run, *, clock: str, resolution: float | None, torque_limit: floa
     require_torque_sign(run, resolution)
     limit = flat_top(run) if torque_limit is None else torque_limit
     saturated = saturation(run, limit, declared=torque_limit is not None)
-    return Screened(run, (*clocks, *wraps, *spikes, *gaps(run, clock), *saturated), limit)
+    return Screened(run, (*clocks, *lost, *wraps, *spikes, *gaps(run, clock), *saturated), limit)
 
 
 def require_finite(run: Run) -> None:

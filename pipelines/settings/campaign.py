@@ -252,6 +252,8 @@ class _Reader:
         try:
             named = {kind: _named_signals(tables, kind, self.rig) for kind in FORMATS}
             used = {log: log_format(Path(log)) for log in logs}
+            if dialect is not None:
+                named["csv"] = replace(named["csv"], dialect=CsvDialect(**dialect.model_dump()))
         except LogError as failure:
             raise CampaignError(f"{where}: {failure}") from None
         for log, log_kind in used.items():
@@ -261,8 +263,6 @@ class _Reader:
                         f"{where}: {log} is a {log_kind} log, and [signals] does not say where {name} stands "
                         f'in those. Add {name} = {{ {log_kind} = "..." }}'
                     )
-        if dialect is not None:
-            named["csv"] = replace(named["csv"], dialect=CsvDialect(**dialect.model_dump()))
         return RigSignals(**named)
 
     def _set_point(self, where: str, entry: ExperimentTable, logs: Sequence[str]) -> SetPointSettings | None:

@@ -136,12 +136,16 @@ class SignalTable(_Table):
 
 
 class DialectTable(_Table):
-    """How CSV files are written, where that shall not be found out by looking."""
+    """How CSV files are written, where that shall not be found out by looking; `inspect` prints it."""
 
     delimiter: str | None = None
     decimal: Literal[".", ","] | None = None
     encoding: str | None = None
     header: bool | None = None
+    units_row: bool | None = None
+    comment: str | None = None
+    quote: str | None = None
+    lines_before_numbers: Annotated[int | None, Field(ge=0)] = None
 
 
 class SignalsTable(_Table):

@@ -27,7 +27,7 @@ from data.names import shown
 from data.signals import Format
 from data.tables.description import DescribedColumn, TableDescription
 from pipelines.exit_status import Status
-from pipelines.inspect import SCHEMA, Description, Inspection, inspect_log, to_plain
+from pipelines.inspect import SCHEMA, Description, Inspection, frozen_dialect, inspect_log, to_plain
 
 MANY: Final = "stribeck/inspections/1"  # the schema of several inspections at once
 _EPOCH: Final = 1e8  # [s]; a start above this is a date
@@ -84,6 +84,9 @@ def print_inspection(inspection: Inspection, console: Console | None = None) -> 
     if inspection.simulated:
         title.append("  SIMULATED", style="bold magenta")
     console.print(Panel(Group(*parts), title=title, title_align="left", border_style="dim"))
+    if isinstance(content, CsvDescription):  # outside the frame and unwrapped, to be copied
+        console.print(Text("to freeze how it is read, under [signals] in campaign.toml:", style="dim"))
+        console.print(Text(frozen_dialect(content)), soft_wrap=True)
 
 
 def _facts(inspection: Inspection) -> Table:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Final
 
@@ -20,7 +20,7 @@ from data.findings import LogError
 from data.mcap.writer import Encoding, write_mcap
 from data.parquet.writer import write_parquet
 from data.recording import Axis, FloatArray
-from data.signals import RigSignals, Signal, Signals, log_format
+from data.signals import CsvDialect, RigSignals, Signal, Signals, log_format
 from data.units import Quantity, factor_to_si, si_word
 from pipelines.settings.campaign_error import CampaignError
 
@@ -28,6 +28,16 @@ EPOCH: Final = 1_700_000_000_000_000_000  # [ns]: a virtual rig's clock starts o
 _ADDRESS: Final = re.compile(
     r"(?P<topic>[^:]+):(?P<field>position|velocity|effort)(\[0\]|\{(?P<joint>[^{}]+)\})?"
 )
+_WRITTEN: Final[dict[str, tuple[object, ...]]] = {  # what a frozen dialect may say of what is written here
+    "delimiter": (None, ","),
+    "decimal": (None, "."),
+    "encoding": (None, "utf-8"),
+    "header": (None, True),
+    "units_row": (None, False),
+    "comment": (None, "#"),
+    "quote": (None, '"'),
+    "lines_before_numbers": (None,),
+}
 
 
 @dataclass(frozen=True)
@@ -87,8 +97,13 @@ def _write_csv(
     values: Mapping[Quantity, FloatArray],
     metadata: Mapping[str, str],
 ) -> None:
-    if signals.dialect is not None and signals.dialect.delimiter not in {None, ","}:
-        raise LogError("the virtual rig writes CSV with commas; leave `delimiter` out")
+    asked = asdict(signals.dialect or CsvDialect())
+    strange = next((key for key, value in asked.items() if value not in _WRITTEN[key]), None)
+    if strange is not None:
+        raise LogError(
+            "the virtual rig writes CSV with commas, decimal points and a header, in UTF-8; leave "
+            f"`{strange}` out of `dialect`"
+        )
     columns, _ = _columns(look, signals, values)
     write_csv(path, columns={name: np.round(array, 12) for name, array in columns.items()}, metadata=metadata)
 

@@ -2,6 +2,8 @@
 
 import json
 import struct
+import tomllib
+import tracemalloc
 from io import StringIO
 from pathlib import Path
 
@@ -10,12 +12,15 @@ import pytest
 import scipy.io
 from rich.console import Console
 
+from data.csv.description import describe
+from data.csv.dialect import sniff
 from data.csv.log import write_csv
 from data.findings import LogError
 from data.mcap.writer import write_mcap
 from data.parquet.writer import write_parquet
 from pipelines.exit_status import Status
 from pipelines.inspect import SCHEMA, inspect_log, to_plain
+from pipelines.settings.campaign import load_campaign
 from pipelines.terminal.inspection import inspect_logs, print_inspection
 from tests.data import hostile
 
@@ -215,3 +220,48 @@ def test_a_clock_that_counts_from_a_date_has_its_exact_rate(tmp_path: Path) -> N
     assert clock["rate"] == pytest.approx(1000.0, rel=1e-12)
     assert clock["jitter"] < 1e-12
     assert clock["start"] == 1.7e9
+
+
+def test_the_dialect_that_is_printed_reads_the_log_as_it_was_read(tmp_path: Path) -> None:
+    text = "% r: 0.9\nt;q\n[s];[deg]\n" + "".join(f"0,{k};1,{k}\n" for k in range(10, 30))
+    (tmp_path / "run.csv").write_bytes(text.encode("utf-16"))
+    line = next(line for line in drawn(tmp_path / "run.csv").splitlines() if line.startswith("dialect = "))
+    assert tomllib.loads(line)["dialect"] == {
+        "delimiter": ";",
+        "decimal": ",",
+        "encoding": "utf-16",
+        "header": True,
+        "units_row": True,
+        "comment": "%",
+        "quote": '"',
+        "lines_before_numbers": 3,
+    }
+    (tmp_path / "campaign.toml").write_text(
+        f"""[signals]
+position = {{ csv = "q", unit = "deg" }}
+torque = {{ csv = "q" }}
+{line}
+[[experiment]]
+protocol = "excitation"
+logs = ["run.csv"]
+"""
+    )
+    signals = load_campaign(tmp_path / "campaign.toml").experiments[0].signals.csv
+    assert signals is not None
+    assert signals.dialect == sniff((tmp_path / "run.csv").read_bytes()).frozen
+
+
+def test_thirty_megabytes_of_csv_in_a_second_and_a_few_times_the_columns(tmp_path: Path) -> None:
+    rows = 400_000
+    values = np.random.default_rng(1).normal(size=(rows, 3))
+    path = tmp_path / "run.csv"
+    columns = {name: values[:, k] for k, name in enumerate("quw")}
+    columns = {"t": 1e-3 * np.arange(rows, dtype=np.float64)} | columns
+    write_csv(path, columns=columns)
+    assert path.stat().st_size > 25e6
+    tracemalloc.start()
+    describe(np.memmap(path, np.uint8, "r"))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 4 * values.nbytes
+    assert min(inspect_log(path).seconds for _ in range(3)) < 2.0  # on a busy machine

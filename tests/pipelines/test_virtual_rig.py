@@ -12,12 +12,15 @@ import pytest
 
 from data.csv.log import write_csv
 from data.ingest import read_recording
-from data.recording import Recording
+from data.recording import FloatArray, Recording
+from data.signals import CsvDialect, RigSignals, Signal, Signals
+from data.units import Quantity
 from ident.model.published import asymmetric_robot
 from ident.response import law_array
 from pipelines.settings.campaign import Campaign, load_campaign
 from pipelines.settings.campaign_error import CampaignError
 from pipelines.virtual.demo_campaign import demo_campaign_text
+from pipelines.virtual.log import Look, write_log
 from pipelines.virtual_rig import TRUTH, record
 
 COUNT = 2 * math.pi / 2**18
@@ -322,3 +325,14 @@ def test_the_demo_s_campaign_is_one(tmp_path: Path, quick: bool) -> None:
     assert settings.compensator is not None
     model, mean = settings.compensator.model(asymmetric_robot()), asymmetric_robot().mean()
     np.testing.assert_allclose(law_array(model), law_array(mean), rtol=1e-12)
+
+
+def test_a_dialect_that_the_virtual_rig_does_not_write_is_refused(tmp_path: Path) -> None:
+    for dialect, said in ((CsvDialect(decimal=","), "decimal"), (CsvDialect(header=False), "header")):
+        signals = Signals(position=Signal("q"), torque=Signal("u"), dialect=dialect)
+        look = Look(RigSignals(csv=signals), "rotary", None, "cdr")
+        run = np.arange(5, dtype=np.float64)
+        values: dict[Quantity, FloatArray] = {"time": run, "position": run, "torque": run}
+        with pytest.raises(CampaignError, match=f"leave `{said}` out"):
+            write_log(tmp_path / "run.csv", look, values=values, metadata={})
+    assert list(tmp_path.iterdir()) == []
