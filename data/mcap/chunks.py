@@ -28,6 +28,7 @@ _WINDOW_CAP: Final = 32 << 20  # bytes that zstd may keep behind
 _FIXED: Final = struct.Struct("<QQQII")  # first and last log time, unpacked size, checksum, length of a name
 _SIZE: Final = struct.Struct("<Q")
 _LONGEST_NAME: Final = 64
+_PIECE: Final = 4 << 20  # bytes that lz4 gives at once
 _MAGIC: Final = {"zstd": b"\x28\xb5\x2f\xfd", "lz4": b"\x04\x22\x4d\x18", "": b""}
 
 
@@ -135,8 +136,7 @@ def _decompress(packed: ByteArray, head: ChunkHead) -> ByteArray:
         if head.compression == "zstd":
             return _unzstd(packed, limit)
         if head.compression == "lz4":
-            machine = lz4.frame.LZ4FrameDecompressor()
-            return np.frombuffer(machine.decompress(packed.tobytes(), max_length=limit), np.uint8)
+            return _unlz4(packed, limit)
     except (zstandard.ZstdError, RuntimeError, ValueError, EOFError, MemoryError) as error:
         raise Damage(head.where, f"a {head.compression} chunk does not unpack ({error})") from error
     raise Damage(head.where, f"a chunk's compression {shown(head.compression, 30)!r} is none of zstd, lz4")
@@ -148,4 +148,17 @@ def _unzstd(packed: ByteArray, limit: int) -> ByteArray:
     with machine.stream_reader(packed.data, read_across_frames=True) as stream:
         while found < limit and (count := stream.readinto(block[found:].data)):
             found += count
+    return block[:found]
+
+
+def _unlz4(packed: ByteArray, limit: int) -> ByteArray:
+    machine = lz4.frame.LZ4FrameDecompressor()
+    block, found = np.empty(limit, np.uint8), 0
+    piece = machine.decompress(packed.tobytes(), max_length=min(limit, _PIECE))
+    while piece:
+        block[found : found + len(piece)] = np.frombuffer(piece, np.uint8)
+        found += len(piece)
+        if found == limit or machine.eof:
+            break
+        piece = machine.decompress(b"", max_length=min(limit - found, _PIECE))
     return block[:found]

@@ -16,7 +16,7 @@ from mcap.records import Channel, Schema
 from numpy.typing import NDArray
 
 from data.mcap.fields import read_channel, read_schema
-from data.mcap.limits import DECLARED_BYTES, MOST_CHANNELS, MOST_DECLARATIONS, MOST_SCHEMAS
+from data.mcap.limits import DECLARED_BYTES, MOST_CHANNELS, MOST_DECLARATIONS, MOST_SCHEMAS, SCHEMA_TYPES
 from data.mcap.records import ByteArray, Damage, Tiling
 
 _DECLARES: Final = np.isin(np.arange(256), (Opcode.SCHEMA, Opcode.CHANNEL))  # by opcode
@@ -131,6 +131,8 @@ class Declarations:
         schema, _ = read_schema(content, where=where)
         if schema.id == 0:
             return "a schema numbered 0, which means none"
+        if schema.data.count(b"\nMSG:") > SCHEMA_TYPES:
+            return f"schema {schema.id} defines more than {SCHEMA_TYPES} types"
         known = self.schemas.get(schema.id)
         if known is None:
             self.schemas[schema.id] = schema

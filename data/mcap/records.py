@@ -27,6 +27,7 @@ Record = TypeVar("Record")
 HEADER: Final = struct.Struct("<BQ")
 MESSAGE_PREFIX: Final = 22  # channel, sequence, log time, publish time
 _PREFIX: Final = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")])
+_SMALL: Final = 1 << 20  # [bytes] that are stepped through without compiled code
 _MOST_RECORDS: Final = 4_000_000  # in one block
 _LATEST: Final = np.iinfo(np.int64).max
 
@@ -91,7 +92,7 @@ def parse(reader: Callable[[ReadDataStream], Record], content: bytes, *, where: 
 def tile(
     block: ByteArray, *, begin: int = 0, within: frozenset[int] | None = None, large: bool = False
 ) -> Tiling:
-    """Find the records of a block, from `begin` on; compiled where it is part of a `large` file.
+    """Find the records of a block, from `begin` on; compiled where it, or the file that it is of, is `large`.
 
     With `within`, stop at the first record that is damaged or whose opcode is not among these.
 
@@ -102,7 +103,8 @@ def tile(
     """
     among = np.zeros(256, np.bool_)
     among[list(within) if within is not None else range(1, 256)] = True
-    tiling = _scanned(block, begin, among) if large else _stepped(block, begin, among)
+    compiled = large or block.size - begin > _SMALL
+    tiling = _scanned(block, begin, among) if compiled else _stepped(block, begin, among)
     if within is None and tiling.end < block.size:
         why, _, _ = look(block.data, tiling.end, block.size)
         raise Damage(tiling.end, why or f"more than {_MOST_RECORDS} records in one chunk")

@@ -30,7 +30,13 @@ from data.mcap.container import MAGIC
 from data.mcap.credible import Surroundings, follows, message_begins, surroundings
 from data.mcap.declarations import Declarations
 from data.mcap.fields import Fields, read_metadata
-from data.mcap.limits import METADATA_BYTES, MOST_ATTACHMENTS, MOST_METADATA
+from data.mcap.limits import (
+    CHUNK_RECORDS,
+    METADATA_BYTES,
+    MOST_ATTACHMENTS,
+    MOST_METADATA,
+    STRETCH_BYTES,
+)
 from data.mcap.proofs import Proofs
 from data.mcap.readable import BLOCK_OPCODES, Dropped, readable, refused
 from data.mcap.records import HEADER, MESSAGE_PREFIX, ByteArray, Damage, Messages, Tiling, look, parse, tile
@@ -171,12 +177,13 @@ class McapWalk:
     def _chunk(self, here: int, stated: int) -> tuple[Block | None, int]:
         """The messages of the chunk at `here` whose record claims to end at `stated`, and where to go on."""
         content, begin = self._content, here + HEADER.size
-        resume = self._if_followed(stated)
         self._chunked = True
+        agree, resume = False, None
         try:
             head = read_head(content, begin, content.size)
-            longer = head.end < stated and resume is not None and self._if_followed(head.end) is None
-            agree = head.end == stated or longer  # a record may have fields that are not known yet
+            agree = head.end == stated
+            if head.end < stated and self._if_followed(head.end) is None:
+                agree = self._if_followed(stated) is not None  # with fields that are not known yet
             end = stated if agree else head.end
             if agree and head.credible:
                 resume = end
@@ -185,11 +192,12 @@ class McapWalk:
             if not agree and not head.checksum:
                 raise Damage(begin, "a chunk's two lengths differ, and no checksum tells which is right")
         except Damage as damage:
+            resume = self._if_followed(stated) if resume is None else resume
             raise Damage(begin, damage.why, resume=resume) from damage
         try:
             found = self._within(block, (here, end), checked=head.checksum != 0) if block.size else None
         except Damage as damage:
-            raise Damage(begin, f"inside a chunk, {damage.why}", resume=resume) from damage
+            raise Damage(begin, f"inside a chunk, {damage.why}", resume=end) from damage
         if not agree:
             why = "the length of a chunk's record is wrong; its content is whole by its checksum"
             self._proofs.lose(here, begin, why, gap=False)
@@ -201,13 +209,17 @@ class McapWalk:
     def _within(self, data: ByteArray, record: tuple[int, int], *, checked: bool) -> Block | None:
         """The messages of a chunk's content; `record`: where the chunk stands in the file."""
         tiling = tile(data, large=self.large)
+        if tiling.opcode.size > CHUNK_RECORDS:
+            raise Damage(record[0], f"more than {CHUNK_RECORDS} records")
         dropped = [refused(tiling, *one) for one in self._declared.take(data, tiling)]
         return self._block(data, tiling, dropped, record=record, checked=checked)
 
     def _stretch(self, here: int) -> tuple[Block | None, int]:
         """The messages that stand outside chunks from `here` on, and where to go on."""
         content = self._content
-        tiling = tile(content, begin=here, within=BLOCK_OPCODES, large=self.large)
+        tiling = tile(content[: here + STRETCH_BYTES], begin=here, within=BLOCK_OPCODES, large=self.large)
+        if not tiling.opcode.size:  # one record that is longer
+            tiling = tile(content, begin=here, within=BLOCK_OPCODES, large=self.large)
         last = int(tiling.begin[-1]) - HEADER.size
         opcode = int(tiling.opcode[-1])
         own = opcode != Opcode.MESSAGE and exact(content, opcode, last + HEADER.size, tiling.end)
