@@ -22,13 +22,15 @@ from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from numpy.typing import NDArray
 
+from data.mcap.limits import CHUNK_RECORDS
+
 ByteArray = NDArray[np.uint8]
 Record = TypeVar("Record")
 HEADER: Final = struct.Struct("<BQ")
 MESSAGE_PREFIX: Final = 22  # channel, sequence, log time, publish time
 _PREFIX: Final = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")])
 _SMALL: Final = 1 << 20  # [bytes] that are stepped through without compiled code
-_MOST_RECORDS: Final = 4_000_000  # in one block
+_FEW: Final = 256  # records that compiled code is not worth
 _LATEST: Final = np.iinfo(np.int64).max
 
 
@@ -104,32 +106,35 @@ def tile(
     among = np.zeros(256, np.bool_)
     among[list(within) if within is not None else range(1, 256)] = True
     compiled = large or block.size - begin > _SMALL
-    tiling = _scanned(block, begin, among) if compiled else _stepped(block, begin, among)
+    tiling = _stepped(block, begin, among, _FEW if compiled else CHUNK_RECORDS)
+    if compiled and tiling.opcode.size == _FEW:
+        tiling = _scanned(block, begin, among, whole=within is None)
     if within is None and tiling.end < block.size:
         why, _, _ = look(block.data, tiling.end, block.size)
-        raise Damage(tiling.end, why or f"more than {_MOST_RECORDS} records in one chunk")
+        raise Damage(tiling.end, why or f"more than {CHUNK_RECORDS} records in one chunk")
     return tiling
 
 
-def _scanned(block: ByteArray, begin: int, among: NDArray[np.bool_]) -> Tiling:
+def _scanned(block: ByteArray, begin: int, among: NDArray[np.bool_], *, whole: bool) -> Tiling:
+    """As `_stepped`; where the `whole` block has to be records and is not, none but the place is told."""
     from data.mcap.scan import scan  # noqa: PLC0415  # numba takes long to load
 
     def pass_over(count: int) -> tuple[Tiling, int]:
         found = Tiling(np.empty(count, np.uint8), np.empty(count, np.int64), np.empty(count, np.int64), 0)
-        seen, end = scan(block, begin, among, _MOST_RECORDS, found.opcode, found.begin, found.length)
+        seen, end = scan(block, begin, among, CHUNK_RECORDS, found.opcode, found.begin, found.length)
         return replace(found, end=end), seen
 
-    _, count = pass_over(0)
-    return pass_over(count)[0]
+    nothing, count = pass_over(0)
+    return nothing if whole and nothing.end < block.size else pass_over(count)[0]
 
 
-def _stepped(block: ByteArray, begin: int, among: NDArray[np.bool_]) -> Tiling:
+def _stepped(block: ByteArray, begin: int, among: NDArray[np.bool_], most: int) -> Tiling:
     raw, size, allowed = block.data, block.size, among.tolist()
     opcodes = bytearray()
     begins: list[int] = []
     lengths: list[int] = []
     here = begin
-    while here < size and len(begins) < _MOST_RECORDS:
+    while here < size and len(begins) < most:
         why, opcode, length = look(raw, here, size)
         if why or not allowed[opcode]:
             break

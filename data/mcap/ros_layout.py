@@ -29,8 +29,8 @@ _PADDED: Final = 3  # bytes by which a message may be longer than its fields
 
 def recognise(fields: tuple[Field, ...], dialect: Dialect, message: bytes) -> Layout | None:
     """The layout that a message shows; None where it holds what no layout can prove."""
-    walk = _Walk(message, dialect)
     try:
+        walk = _Walk(message, dialect)
         walk.message(fields, "")
     except (_Unprovable, struct.error, UnicodeDecodeError):
         return None

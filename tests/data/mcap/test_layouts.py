@@ -191,6 +191,7 @@ def test_ros1_of_any_definition(drawn: tuple[list[dict[str, Any]], int, int]) ->
 def test_no_bytes_upset_the_ros_layouts(raw: bytes, dialect: Any) -> None:
     definition = DEFINITION if dialect == "ros2" else ROS1_DEFINITION
     fields = parse_definition("pkg/State", definition, dialect)
+    assert ros_layout.recognise(fields, dialect, raw[:1]) is None
     layout = ros_layout.recognise(fields, dialect, raw if dialect == "ros1" else b"\0\1\0\0" + raw)
     assert layout is None or layout.size >= len(raw)
 
@@ -419,7 +420,7 @@ def test_the_compiled_scan_finds_what_the_plain_one_finds(
     block = np.frombuffer(raw + b"\0", np.uint8)[:-1]
     among = np.ones(256, np.bool_)
     among[[0, 13]] = False
-    plain, compiled = _stepped(block, 0, among), _scanned(block, 0, among)
+    plain, compiled = _stepped(block, 0, among, 1000), _scanned(block, 0, among, whole=False)
     assert plain.end == compiled.end
     for name in ("opcode", "begin", "length"):
         assert getattr(plain, name).tolist() == getattr(compiled, name).tolist()
