@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 from data.clocks import ClockReport, clock_report_ns
 from data.findings import LogError
 from data.integrity import Integrity
-from data.mcap import joint_state
 from data.mcap.attachments import AttachmentLabel
 from data.mcap.columns import run_metadata
-from data.mcap.decoding import decoder
+from data.mcap.decoding import decoder, recogniser
 from data.mcap.field_path import leaves
-from data.mcap.records import ByteArray, gather
+from data.mcap.layout import Layout, prove, stamps
+from data.mcap.records import ByteArray
+from data.mcap.stamp import NO_STAMP
 from data.mcap.walk import Block, McapWalk
 
 MOST_LISTED: Final = 500  # channels
@@ -79,7 +80,7 @@ class _Seen:
     first: bytes
     log: list[NDArray[np.int64]] = field(default_factory=list)
     header: list[NDArray[np.int64]] = field(default_factory=list)
-    layout: joint_state.Layout | None = None
+    layout: Layout | None = None
 
 
 def describe(content: ByteArray) -> McapDescription:
@@ -124,17 +125,19 @@ def _take(walk: McapWalk, block: Block, number: int, mine: NDArray[np.intp], see
         schema = walk.schemas.get(channel.schema_id)
         first = block.data[int(begin[0]) : int(begin[0] + length[0])].tobytes()
         seen[number] = _Seen(channel, schema, first)
-        if schema and joint_state.is_joint_state(schema.name, schema.data.decode(errors="replace")):
-            seen[number].layout = joint_state.recognise(first)
+        recognise = recogniser(channel, schema)
+        seen[number].layout = recognise(first) if recognise else None
     part = seen[number]
     part.log.append(found.log_time[mine])
-    if part.layout is not None:
-        if np.all(length == part.layout.size):
-            rows = gather(block.data, begin, part.layout.size)
-            if joint_state.matches(part.layout, rows).all():
-                part.header.append(joint_state.stamps(rows))
-                return
+    if part.layout is None:
+        return
+    own = None
+    if np.all(length == part.layout.size) and prove(part.layout, block.data, begin, large=walk.large).all():
+        own = stamps(part.layout, block.data, begin)
+    if own is None or np.any(own == NO_STAMP):
         part.layout, part.header = None, []
+    else:
+        part.header.append(own)
 
 
 def _channel(part: _Seen) -> ChannelDescription:
