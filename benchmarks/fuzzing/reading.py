@@ -100,7 +100,7 @@ def _read_table(content: bytes) -> Outcome:
         refused = True
     try:
         layout = sniff(content)
-        table = read_csv(content, layout, range(3))
+        table = read_csv(content, layout, range(min(3, len(layout.units))))
         integrity = table_integrity(table)
         refused = not _allowed(integrity, salvage=False)
         salvaged = refused and _allowed(integrity, salvage=True)

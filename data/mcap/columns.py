@@ -10,8 +10,7 @@ stamp in the message's own header where it has one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from itertools import pairwise
@@ -85,7 +84,7 @@ def read_columns(
     for path in wanted:
         paths.setdefault(path.topic, []).append(path)
     readers: dict[int, _ChannelReader] = {}
-    for block in _ahead(walk.blocks()) if walk.large else walk.blocks():
+    for block in walk.blocks():
         for number in np.flatnonzero(np.bincount(block.messages.channel)).tolist():
             channel = walk.channels[number]
             if channel.topic in paths:
@@ -99,15 +98,6 @@ def read_columns(
         integrity=walk.integrity,
         decoded_singly=sum(reader.singly for reader in readers.values()),
     )
-
-
-def _ahead(blocks: Iterator[Block]) -> Iterator[Block]:
-    """The blocks, each unpacked and checked in a second thread while the one before is read."""
-    with ThreadPoolExecutor(1) as worker:
-        coming = worker.submit(next, blocks, None)
-        while (block := coming.result()) is not None:
-            coming = worker.submit(next, blocks, None)
-            yield block
 
 
 def survey(content: ByteArray) -> Integrity:

@@ -37,6 +37,7 @@ _CHUNKED: Final = (
     Opcode.STATISTICS,
     Opcode.FOOTER,
 )
+_OF_CHUNKS: Final = (Opcode.CHUNK, Opcode.MESSAGE_INDEX, Opcode.CHUNK_INDEX)
 _LOOSE: Final = (*_CHUNKED, Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL)
 _PARTS: Final[dict[int, tuple[int, ...]]] = {
     Opcode.HEADER: (0, 0),
@@ -62,10 +63,10 @@ class Seeker:
         self._chunked: bool | None = None
 
     def chunked(self) -> bool:
-        """Whether there is a chunk anywhere in the file."""
+        """Whether there is a chunk anywhere in the file, or an index of one."""
         if self._chunked is None:
             nothing = Surroundings(np.zeros(1 << 16, np.bool_), (0, 0), (0, 0))
-            self._chunked = self._next(len(MAGIC), nothing, (Opcode.CHUNK,)) is not None
+            self._chunked = self._next(len(MAGIC), nothing, _OF_CHUNKS) is not None
         return self._chunked
 
     def next_record(self, after: int, near: Surroundings, *, loose: bool) -> int | None:
@@ -125,9 +126,9 @@ class Seeker:
             return length == _FOOTER_CONTENT and content[end : end + len(MAGIC)].tobytes() == MAGIC
         if not follows(content, end, near):
             return False
-        if opcode == Opcode.MESSAGE:
-            return True
-        return exact(content, opcode, begin, end)
+        if opcode == Opcode.MESSAGE_INDEX and length == LEAST[opcode]:
+            return False  # of nothing
+        return opcode == Opcode.MESSAGE or exact(content, opcode, begin, end)
 
 
 def disguised(content: ByteArray, begin: int, end: int) -> bool:
@@ -147,7 +148,8 @@ def exact(content: ByteArray, opcode: int, begin: int, end: int) -> bool:
     if opcode == Opcode.STATISTICS:
         return len(raw) == LEAST[opcode] + int.from_bytes(raw[42:46], "little")
     if opcode == Opcode.MESSAGE_INDEX:
-        return len(raw) == LEAST[opcode] + int.from_bytes(raw[2:6], "little")
+        size = int.from_bytes(raw[2:6], "little")
+        return len(raw) == LEAST[opcode] + size and size % 16 == 0  # pairs of a time and an offset
     fields = Fields(raw, where=begin, record="")
     try:
         if opcode == Opcode.SCHEMA:

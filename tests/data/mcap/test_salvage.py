@@ -230,3 +230,11 @@ def test_padding_of_zeros_behind_a_cut_is_no_message() -> None:
     found, messages = walk(content[: last + 40] + bytes(4096))
     assert len(messages) == 19
     assert found.integrity.losses[0].begin == last
+
+
+def test_messages_of_a_chunk_whose_head_is_gone_are_not_believed(tmp_path: Path) -> None:
+    content = hostile.run(tmp_path / "run.mcap", n=30, compression="none")
+    (place,) = records(content, 6)
+    found, messages = walk(content[:place] + bytes(49) + content[place + 49 :])
+    assert messages == []  # its checksum is gone too, and nothing else vouches for them
+    assert found.integrity.losses[0].begin == place
