@@ -15,7 +15,7 @@ import json
 import tempfile
 import tracemalloc
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -83,7 +83,8 @@ def _rows_of(encoding: str, scratch: Path, messages: int) -> list[Row]:
     def peer() -> None:
         theirs[:] = [_ordinary(part, encoding)]
 
-    mine, other, floor = in_turns([ours, peer, lambda: _unpacked(whole)], rounds=3, repeats=(1, 1, 1))
+    chunks = _chunks(whole)
+    mine, other, floor = in_turns([ours, peer, lambda: _unpack(chunks)], rounds=3, repeats=(1, 1, 1))
     columns = np.array(list(found[0].topics[_TOPIC].values.values()))
     wrong = float(np.max(np.abs(columns - truth)))
     off = float(np.max(np.abs(theirs[0] - part_truth)))
@@ -119,11 +120,17 @@ def _peak(path: Path, encoding: str) -> float:
     return (peak - (1 << 20)) / columns
 
 
-def _unpacked(path: Path) -> None:
+def _chunks(path: Path) -> list[tuple[bytes, int]]:
+    """Each chunk as it is packed, and its size."""
     with path.open("rb") as stream:
-        for record in StreamReader(stream, emit_chunks=True).records:
-            if isinstance(record, Chunk):
-                zlib.crc32(zstandard.decompress(record.data, max_output_size=record.uncompressed_size))
+        records = StreamReader(stream, emit_chunks=True).records
+        return [(own.data, own.uncompressed_size) for own in records if isinstance(own, Chunk)]
+
+
+def _unpack(chunks: Sequence[tuple[bytes, int]]) -> None:
+    machine = zstandard.ZstdDecompressor()
+    for data, size in chunks:
+        zlib.crc32(machine.decompress(data, max_output_size=size))
 
 
 def _ordinary(path: Path, encoding: str) -> FloatArray:
