@@ -105,10 +105,13 @@ def tile(
     """
     among = np.zeros(256, np.bool_)
     among[list(within) if within is not None else range(1, 256)] = True
-    compiled = large or block.size - begin > _SMALL
-    tiling = _stepped(block, begin, among, _FEW if compiled else CHUNK_RECORDS)
-    if compiled and tiling.opcode.size == _FEW:
+    if large:
         tiling = _scanned(block, begin, among, whole=within is None)
+    else:
+        few = _FEW if block.size - begin > _SMALL else CHUNK_RECORDS
+        tiling = _stepped(block, begin, among, few)
+        if tiling.opcode.size == few:
+            tiling = _scanned(block, begin, among, whole=within is None)
     if within is None and tiling.end < block.size:
         why, _, _ = look(block.data, tiling.end, block.size)
         raise Damage(tiling.end, why or f"more than {CHUNK_RECORDS} records in one chunk")
