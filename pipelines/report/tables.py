@@ -126,9 +126,12 @@ def table1_markdown(robot: Mapping[str, Any], *, truth: Mapping[str, Any] | None
 
 
 def table1_text(robot: Mapping[str, Any], *, truth: Mapping[str, Any] | None = None) -> list[str]:
-    """Lines for a terminal, a row a parameter and direction; why something is withheld is said elsewhere."""
+    """Lines for a terminal, a row a parameter and direction; why something is withheld is said elsewhere.
+
+    The paper's values stand beside those of a virtual rig alone: another rig has nothing to do with them.
+    """
     entries = table1_entries(robot, truth=truth)
-    beside = references(entries)
+    beside = references(entries) if truth else []
     heading = f"Table 1{f', {SIMULATED.upper()}' if robot.get('simulated') else ''}: values [95 % intervals]"
     lines = [f"{heading:58}{''.join(f'{name:>10}' for name in beside)}".rstrip()]
     for direction in ("", *DIRECTIONS):

@@ -6,7 +6,7 @@ import pytest
 
 from ident.model import published
 from pipelines.report.numerals import shown_interval, shown_number, shown_percent
-from pipelines.report.tables import table1_csv, table1_entries, table1_markdown, table1_tex
+from pipelines.report.tables import table1_csv, table1_entries, table1_markdown, table1_tex, table1_text
 from tests.pipelines.report import examples
 
 
@@ -67,6 +67,16 @@ def test_no_text_cell_is_a_formula(start: str) -> None:
     ]
     damping = next(r for r in rows if (r["parameter"], r["direction"]) == ("viscous_damping", "positive"))
     assert float(damping["value"]) == -0.08
+
+
+def test_the_terminal_shows_the_paper_beside_a_virtual_rig_alone() -> None:
+    virtual = table1_text(dict(examples.robot(), simulated=True), truth=examples.truth())
+    assert virtual[0].split()[-2:] == ["paper", "truth"]
+    assert "0.5735" in "\n".join(virtual)
+    real = table1_text(examples.robot())
+    assert "paper" not in real[0]
+    assert len(real) == len(virtual)
+    assert not any("\\" in line for line in real)
 
 
 def test_markdown_is_one_table_and_no_markup_from_outside() -> None:
