@@ -84,6 +84,7 @@ class SteadyRun:
     why: str | None = None  # why it is left out, beginning with its code
     place_stderr: float = 0.0  # of the mean torque, from what varies with position [N m]
     trimmed: str | None = None  # what was cut off of a run that is used, beginning with its code
+    momentum_variance: float = 0.0  # that a hunting speed loop gives within the run [(N m s)^2]
     torque_change: float = math.nan  # from end to end of the run, along a line; NaN if unknown [N m]
     scatter: float = math.inf  # standard deviation of the torque within the run; infinite if unknown [N m]
 

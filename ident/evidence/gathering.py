@@ -15,7 +15,7 @@ from ident.estimate import RunUse
 from ident.evidence.breakaway import Breakaway, breakaways
 from ident.evidence.frequency_response import FrequencyInertia, frequency_inertia
 from ident.evidence.friction_map import SteadyRun, steady_runs
-from ident.evidence.hunting import SAMPLES, hunts, sensor_noise
+from ident.evidence.hunting import SAMPLES, hunts, momentum_variance, sensor_noise
 from ident.evidence.momentum import Momentum, momentum
 from ident.evidence.position_ripple import Wave, find_waves
 from ident.evidence.ripple_correction import (
@@ -102,19 +102,21 @@ def _without_hunting(
     """The runs, those in which the speed loop hunts left out with the reason (`ident.evidence.hunting`)."""
     logs = [*_of(recordings, "constant_velocity"), *_of(recordings, "breakaway")]
     noise = sensor_noise([recording.torque for recording in logs]) if logs else 0.0
-    kept = []
-    for run in runs:
-        speed, torque = abs(run.velocity), abs(run.torque)
-        if run.why is None and hunts(run.swing, speed=speed, torque=torque, inertia=inertia, noise=noise):
-            why = (
-                f"E-STICKSLIP: the torque swings by {run.swing.torque**0.5:.3g} about {torque:.3g} within "
-                f"{SAMPLES} samples, enough to stop a link of this inertia at {speed:.3g}: the speed loop "
-                "hunts from count to count, and the mean torque is not the friction at the mean speed. Use a "
-                "finer encoder or a softer loop."
-            )
-            run = replace(run, why=why)  # noqa: PLW2901  (the same run with its reason)
-        kept.append(run)
-    return tuple(kept)
+    return tuple(run if run.why is not None else _hunted(run, inertia, noise) for run in runs)
+
+
+def _hunted(run: SteadyRun, inertia: float, noise: float) -> SteadyRun:
+    """A run with what swings its speed, or left out for it."""
+    speed, torque = abs(run.velocity), abs(run.torque)
+    if not hunts(run.swing, speed=speed, torque=torque, inertia=inertia, noise=noise):
+        return replace(run, momentum_variance=momentum_variance(run.swing, torque=torque, noise=noise))
+    why = (
+        f"E-STICKSLIP: the torque swings by {run.swing.torque**0.5:.3g} about {torque:.3g} within {SAMPLES} "
+        f"samples, enough to stop a link of this inertia at {speed:.3g}: the speed loop hunts from count to "
+        "count, and the mean torque is not the friction at the mean speed. Use a finer encoder or a softer "
+        "loop."
+    )
+    return replace(run, why=why)
 
 
 def require_evidence(recordings: Sequence[Recording], evidence: Evidence) -> None:

@@ -9,7 +9,8 @@ case. The torque tells: over a few dozen samples its swing about its own mean ca
 pinned to zero at both ends, and so swings the speed by about P/J. White noise of the torque sensor alone
 gives P the mean square sigma^2 h^2 n / 6 over n samples h apart; the excess over that is motion. A run is
 left out where it swings the speed by over half of its mean while the torque itself swings by over a fifth:
-friction answers small swings of the torque without any motion.
+friction answers small swings of the torque without any motion. Smaller swings are reckoned with: the mean
+of a curved law is not the law at the mean speed (`ident.fit.weighting`).
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from ident.evidence.segmentation import Stretch
 SAMPLES = 50  # over which a swing is looked for
 SPEED_SWING = 0.5  # of the mean speed
 TORQUE_SWING = 0.2  # of the mean torque
+SEEN_SWING = 0.15  # of the mean torque, from which on a swing of the speed is reckoned with
 
 
 @dataclass(frozen=True)
@@ -54,10 +56,18 @@ def sensor_noise(torques: Sequence[FloatArray]) -> float:
     return min(1.4826 * float(np.median(np.abs(np.diff(u)))) / float(np.sqrt(2.0)) for u in torques)
 
 
-def hunts(swung: Swing, *, speed: float, torque: float, inertia: float, noise: float) -> bool:
-    """Whether a run at a mean speed [rad/s] and torque [N m], magnitudes, is no constant speed."""
+def momentum_variance(swung: Swing, *, torque: float, noise: float) -> float:
+    """What the torque's swing gives the link [(N m s)^2]; 0 where it is too small to say so.
+
+    A torque that swings little may as well follow a friction that does.
+    """
     excess = swung.momentum - noise**2 * swung.period**2 * SAMPLES / 6.0
     own = swung.torque - noise**2
-    if excess <= 0.0 or own <= 0.0:
-        return False
-    return bool(excess**0.5 > SPEED_SWING * speed * inertia and own**0.5 > TORQUE_SWING * torque)
+    return excess if excess > 0.0 and own > (SEEN_SWING * torque) ** 2 else 0.0
+
+
+def hunts(swung: Swing, *, speed: float, torque: float, inertia: float, noise: float) -> bool:
+    """Whether a run at a mean speed [rad/s] and torque [N m], magnitudes, is no constant speed."""
+    carried = momentum_variance(swung, torque=torque, noise=noise)
+    own = max(swung.torque - noise**2, 0.0)
+    return carried > (SPEED_SWING * speed * inertia) ** 2 and own > (TORQUE_SWING * torque) ** 2

@@ -37,6 +37,8 @@ class FitData:
     momenta: tuple[Momentum, ...]
     whitening: tuple[FloatArray, ...]  # (k, k) for each momentum: the inverse square root of its covariance
     inertia: tuple[float, float] | None  # from the frequency response, with its standard error
+    # What a swinging speed adds to the mean torque of a curved law, taken off `torque` already.
+    sway: FloatArray = field(default_factory=lambda: np.zeros(()))  # (n,) [N m]
     trend: RateTrend | None = None  # over the ramp rates, that the start torques are less of
     # (g, n + m): of the variance of each run, then each breakaway, the part that each estimated spread makes
     shares: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))  # [-]

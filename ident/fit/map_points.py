@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ident.evidence.friction_map import MapPoint
 from ident.evidence.gathering import Evidence
 from ident.fit.weighting import Weighted, onset_torque
@@ -12,6 +14,7 @@ def friction_map(evidence: Evidence, weighted: Weighted) -> tuple[MapPoint, ...]
     points = []
     data, used = weighted.data, iter(range(weighted.data.torque.size))
     offset = weighted.fit.values["torque_offset"]
+    sway = np.broadcast_to(data.sway, data.torque.shape)
     inertia = weighted.fit.values["inertia"] if data.has_inertia else 0.0
     for run in evidence.runs:
         number = next(used) if run.why is None else None
@@ -23,7 +26,7 @@ def friction_map(evidence: Evidence, weighted: Weighted) -> tuple[MapPoint, ...]
                 direction=run.direction,
                 velocity=run.velocity,
                 torque=torque,
-                fitted=None if number is None else torque - offset,
+                fitted=None if number is None else torque - offset - run.direction * float(sway[number]),
                 stderr=None if number is None else float(data.run_stderr[number]),
                 velocity_stderr=run.velocity_stderr,
                 ramp_rate=None,

@@ -31,6 +31,9 @@ from ident.fit.ramp_rates import rate_trend
 from ident.fit.variance_model import Spread, averaged_out, members, spread_of, white_variance
 from ident.response import breakaway_delay
 
+# Of what a swing of the torque alone would do to the mean: friction takes its share of the momentum. The
+# doubt grows with the swing, of which only the second order is reckoned with.
+SWAY_TAKEN, SWAY_DOUBT = 0.7, 0.3
 ROUNDS = 5  # of the steady runs alone
 MOST_ROUNDS = 12  # with the motion
 SETTLED = 0.02  # standard errors by which a round may still move the fit
@@ -83,6 +86,7 @@ def with_inertia(
         inertia=inertia,
         inertia_dof=dof,
         torque=torque.torque,
+        sway=torque.sway,
         acceleration=torque.acceleration,
     )
     fit = replace(weighted.fit, values={**weighted.fit.values, "inertia": inertia[0]})
@@ -175,7 +179,27 @@ def _own_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatA
     runs = evidence.used_runs
     speed = np.array([run.velocity_stderr for run in runs])
     place = np.array([run.place_stderr for run in runs])
-    return np.asarray(white_variance(runs) + place**2 + (law_slopes(data, fit) * speed) ** 2)
+    doubt = (SWAY_DOUBT + _speed_variance(evidence, fit) / data.speed**2) * _sway(evidence, data, fit)
+    return np.asarray(white_variance(runs) + place**2 + (law_slopes(data, fit) * speed) ** 2 + doubt**2)
+
+
+def _speed_variance(evidence: Evidence, fit: FrictionFit) -> FloatArray:
+    """How much a hunting loop swings the speed of each run (n,) [(rad/s)^2], as far as J is known."""
+    momentum = np.array([run.momentum_variance for run in evidence.used_runs])
+    inertia = fit.values["inertia"]
+    return momentum / inertia**2 if inertia > 0.0 else np.zeros_like(momentum)
+
+
+def _sway(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatArray:
+    """F''(v) sigma_v^2 / 2 of each run (n,) [N m]: mean of a curved law less the law at the mean speed."""
+    bend = np.zeros_like(data.torque)
+    for direction in data.model.directions:
+        own = data.run_direction == SIGN[direction]
+        law, speed = fit.law(direction), data.speed[own]
+        step = 1e-3 * speed
+        ends = friction_torque(law, speed + step) + friction_torque(law, speed - step)
+        bend[own] = (ends - 2.0 * friction_torque(law, speed)) / step**2
+    return np.asarray(0.5 * bend * _speed_variance(evidence, fit))
 
 
 def _start_variance(evidence: Evidence, data: FitData, fit: FrictionFit) -> FloatArray:
@@ -206,8 +230,11 @@ def reweighted(evidence: Evidence, data: FitData, fit: FrictionFit, spread: Spre
         start_stderr = start_stderr * trend.widening(data.start_direction)
     start_torque, start_stderr = _with_bounds(evidence, data, start_torque, start_stderr)
     scale, dof = _motion_scale(data.momenta, fit, spread)
+    sway = SWAY_TAKEN * _sway(evidence, data, fit)
     return replace(
         data,
+        torque=data.torque + data.sway - sway,
+        sway=sway,
         run_stderr=np.sqrt(total[:runs]),
         start_torque=start_torque,
         start_stderr=start_stderr,
