@@ -13,10 +13,7 @@ from data.elapsed import EPOCH
 from data.units import parse_unit
 
 KEYS: Final = ("began", "begun", "start", "started", "start_time", "recorded", "date", "datetime", "time")
-
 DAY: Final = len("2004-01-31")
-
-
 _FILETIME: Final = 11_644_473_600.0  # [s] from 1601, where Windows begins to count, to 1970
 
 

@@ -89,7 +89,7 @@ def _described(path: Path, file_format: Format, content: ByteArray) -> Descripti
     if file_format == "mcap":
         return mcap_description.describe(content)
     if file_format == "csv":
-        return csv_description.describe(content.tobytes())
+        return csv_description.describe(content)
     return table_description.describe((ParquetLog if file_format == "parquet" else MatLog)(content))
 
 

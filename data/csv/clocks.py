@@ -16,25 +16,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data.alignment import align
-from data.csv.layout import CsvLayout, bare
+from data.columns import TIME_NAMES, bare
+from data.csv.layout import CsvLayout
 from data.csv.log import CsvTable, elapsed_together, find_column
 from data.findings import LogError
 from data.names import shown
 
 FloatArray = NDArray[np.float64]
-TIME_NAMES: Final = (
-    "t",
-    "time",
-    "__time",
-    "timestamp",
-    "x_value",
-    "zeit",
-)  # columns that are plainly the time
+_PLAIN: Final = (*TIME_NAMES, "x_value", "zeit")  # LabVIEW's, and in German
 
 
 def time_columns(layout: CsvLayout) -> tuple[int, ...]:
     """The columns that are plainly the time."""
-    return tuple(k for k, header in enumerate(layout.headers) if bare(header).lower() in TIME_NAMES)
+    return tuple(k for k, header in enumerate(layout.headers) if bare(header).lower() in _PLAIN)
 
 
 def governing(layout: CsvLayout, column: int) -> int | None:
@@ -57,7 +51,7 @@ def time_column(layout: CsvLayout, source: str | int | None, position: int) -> i
         if own is None:
             raise LogError(
                 "[signals] names no time for csv logs, and no column is plainly the time "
-                f'(one of {", ".join(TIME_NAMES)}); add time = {{ csv = "..." }}'
+                f'(one of {", ".join(_PLAIN)}); add time = {{ csv = "..." }}'
             )
         return own
     times = time_columns(layout)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data.clocks import ClockReport, clock_report
+from data.columns import value_range
 from data.csv.clocks import time_columns
 from data.csv.dialect import sniff
 from data.csv.layout import CsvLayout
@@ -80,15 +81,7 @@ def _column(k: int, layout: CsvLayout, values: NDArray[np.float64] | None, why: 
     header = layout.headers[k] if layout.headers else ""
     if values is None:
         return Column(k, header, layout.units[k], None, None, 0, why)
-    finite = values[np.isfinite(values)]
-    return Column(
-        number=k,
-        header=header,
-        unit=layout.units[k],
-        low=float(finite.min()) if finite.size else None,
-        high=float(finite.max()) if finite.size else None,
-        missing=int(values.size - finite.size),
-    )
+    return Column(k, header, layout.units[k], *value_range(values))
 
 
 def _clock(table: CsvTable, times: Sequence[int]) -> tuple[ClockReport | None, str | None]:

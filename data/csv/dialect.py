@@ -15,9 +15,10 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
+from data.columns import declared_unit
 from data.csv.cells import Decimal, is_missing, is_number, numeric_share, split
 from data.csv.headers import LABVIEW_END, is_units_row, names_pairs, read_above
-from data.csv.layout import CsvLayout, declared_unit
+from data.csv.layout import CsvLayout
 from data.csv.records import Record, records
 from data.csv.text import ByteArray, Text, lines, open_text, utf8
 from data.findings import LogError

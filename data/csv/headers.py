@@ -147,11 +147,10 @@ def _joined_units(row: Sequence[str]) -> list[str]:
     """Names between blanks with the units that stand behind them: `u`, `[N`, `m]` is one."""
     names: list[str] = []
     for cell in row:
-        opened = names and names[-1].count("[") + names[-1].count("(") > names[-1].count("]") + names[
-            -1
-        ].count(")")
+        last = names[-1] if names else ""
+        opened = last.count("[") + last.count("(") > last.count("]") + last.count(")")
         if names and (opened or cell[:1] in {"[", "("}):
-            names[-1] = f"{names[-1]} {cell}"
+            names[-1] = f"{last} {cell}"
         else:
             names.append(cell)
     return names

@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from typing import Final
 
 from data.csv.cells import Decimal
 from data.signals import CsvDialect
-from data.units import known_unit
-
-_BRACKETED: Final = re.compile(r"^(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))$")
-_SUFFIXED: Final = re.compile(r"^.+_(deg|rad|mrad|rpm)$")  # the only endings that cannot mean anything else
 
 
 @dataclass(frozen=True)
@@ -57,19 +51,3 @@ class CsvLayout:
             quote=self.quote,
             lines_before_numbers=self.first_row,
         )
-
-
-def bare(header: str) -> str:
-    """A header without its unit: `q` for `q [deg]`."""
-    found = _BRACKETED.match(header.strip())
-    return (found[1] if found else header).strip()
-
-
-def declared_unit(header: str) -> str | None:
-    """The unit that a header declares, in brackets or by an ending that can mean nothing else; None: none."""
-    found = _BRACKETED.match(header.strip())
-    word = (found[2] or found[3] or "") if found else ""
-    if not word:
-        ending = _SUFFIXED.match(header.strip())
-        word = ending[1] if ending else ""
-    return word.strip() if word and known_unit(word) else None

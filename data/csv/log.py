@@ -20,8 +20,9 @@ import pyarrow as pa
 import pyarrow.csv as arrow_csv
 from numpy.typing import NDArray
 
+from data.columns import called, require_one_length
 from data.csv.cells import NotNumbersError, numbers
-from data.csv.layout import CsvLayout, bare
+from data.csv.layout import CsvLayout
 from data.csv.rows import Block, Rows, Tally, whole_rows
 from data.csv.text import ByteArray, open_text
 from data.elapsed import FINE, since_first_written
@@ -52,9 +53,7 @@ def write_csv(
     LogError
         When the arrays differ in length, or a header or metadata text holds a control character.
     """
-    lengths = {header: array.shape for header, array in columns.items()}
-    if len(set(lengths.values())) > 1 or any(len(shape) != 1 for shape in lengths.values()):
-        raise LogError(f"{path.name}: the columns to write differ in shape: {lengths}")
+    require_one_length(path, columns)
     for text in (*columns, *(metadata or {}).keys(), *(metadata or {}).values()):
         if not text.isprintable():
             raise LogError(f"{path.name}: {text!r} holds a control character and cannot stand in a CSV log")
@@ -222,8 +221,7 @@ def find_column(layout: CsvLayout, source: str | int) -> int:
     """
     if isinstance(source, str):
         names = [header.strip() for header in layout.headers]
-        exact = [k for k, name in enumerate(names) if name == source.strip()]
-        matching = exact or [k for k, name in enumerate(names) if bare(name) == source.strip()]
+        matching = called(names, source)
         if len(matching) > 1:
             raise LogError(
                 f"{len(matching)} columns are called {shown(source)!r} (numbers {matching}); "

@@ -39,12 +39,12 @@ _NO_TEXT: Final = (
     (b"PK\x03\x04", "a zip archive, or an Excel workbook: unpack it, or export it as CSV"),
     (b"\xd0\xcf\x11\xe0", "an Excel workbook: export it as CSV"),
     (b"\x89MCAP", "an MCAP log: rename it to .mcap"),
-    (b"\x89HDF", "an HDF5 file, or a MATLAB file of version 7.3: export it as CSV"),
-    (b"MATLAB 5", "a MATLAB file: export it as CSV"),
-    (b"PAR1", "a Parquet file: export it as CSV"),
+    (b"\x89HDF", "an HDF5 file, or a MATLAB file of version 7.3: save that with -v7, or export it as CSV"),
+    (b"MATLAB 5", "a MATLAB file: rename it to .mat"),
+    (b"PAR1", "a Parquet file: rename it to .parquet"),
     (b"TDSm", "a LabVIEW TDMS file: export it as CSV"),
-    (b"#ROSBAG", "a ROS bag: convert it to MCAP"),
-    (b"SQLite format 3", "a SQLite database: export it as CSV"),
+    (b"#ROSBAG", "a ROS bag: rename it to .bag"),
+    (b"SQLite format 3", "a SQLite database: if a ROS bag, rename it to .db3; else export it as CSV"),
 )
 
 

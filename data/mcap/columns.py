@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from data.findings import LogError
 from data.integrity import Integrity
 from data.mcap.decoding import Decode, Recognise, decoder, recogniser
-from data.mcap.field_path import FieldPath, Number, resolve, resolve_exactly
+from data.mcap.field_path import FieldPath, resolve, resolve_exactly
 from data.mcap.layout import Layout, Place, numbers, place, prove, stamps
 from data.mcap.records import ByteArray
 from data.mcap.stamp import NO_STAMP, header_stamp
@@ -91,7 +91,11 @@ def read_columns(
                 if number not in readers:
                     readers[number] = _reader(walk, channel, paths[channel.topic], clock)
                 readers[number].take(block, number)
-    topics = {topic: _topic(walk, topic, readers) for topic in paths}
+    declared = [channel.topic for channel in walk.channels.values()]
+    parts: dict[str, list[Topic]] = {topic: [] for topic in paths}
+    for number, reader in readers.items():
+        parts[walk.channels[number].topic].append(reader.topic())
+    topics = {topic: joined(topic, own, declared) for topic, own in parts.items()}
     return McapColumns(
         topics=topics,
         metadata=run_metadata(walk),
@@ -133,22 +137,25 @@ def _reader(
     return _ChannelReader(paths, decode, recognise=recogniser(channel, schema), large=walk.large)
 
 
-def _topic(walk: McapWalk, topic: str, readers: Mapping[int, _ChannelReader]) -> Topic:
-    """The topic's columns, from its one channel or from several that took turns."""
-    mine = [(number, readers[number].topic()) for number in readers if walk.channels[number].topic == topic]
-    if not mine:
-        declared = [channel.topic for channel in walk.channels.values()]
+def joined(topic: str, parts: Sequence[Topic], declared: Sequence[str]) -> Topic:
+    """A topic's columns, from its one channel or from several that took turns.
+
+    Raises
+    ------
+    LogError
+        When no channel had a message of it (`declared` are the log's topics), or two had at the same time.
+    """
+    if not parts:
         if topic in declared:
-            raise LogError(f"topic {topic!r} is declared but holds no message")
-        raise LogError(f"no topic {topic!r}; the log has {nearest(topic, declared)}")
-    mine.sort(key=lambda pair: int(pair[1].log_time[0]))
-    for (_, before), (_, after) in pairwise(mine):
+            raise LogError(f"topic {shown(topic)!r} is declared but holds no message")
+        raise LogError(f"no topic {shown(topic)!r}; the log has {nearest(topic, declared)}")
+    parts = sorted(parts, key=lambda part: int(part.log_time[0]))
+    for before, after in pairwise(parts):
         if before.log_time.max() >= after.log_time.min():
             raise LogError(
-                f"topic {shown(topic)!r} is on {len(mine)} channels at the same time: two publishers, and no "
-                "way to tell which is the rig's. Keep one of them in the log"
+                f"topic {shown(topic)!r} is on {len(parts)} channels at the same time: two publishers, and "
+                "no way to tell which is the rig's. Keep one of them in the log"
             )
-    parts = [part for _, part in mine]
     if len(parts) == 1:
         return parts[0]
     headers = [part.header_time for part in parts if part.header_time is not None]
@@ -182,23 +189,24 @@ class _ChannelReader:
         found = block.messages
         mine = np.flatnonzero(found.channel == number)
         begin, length = found.begin[mine], found.length[mine]
-        values = np.empty((len(self.paths), mine.size))
-        header = np.full(mine.size, NO_STAMP, np.int64)
-        left = np.ones(mine.size, np.bool_)
+        if self.json is not None:
+            read, values, header = self.json.read(block.data, begin, length)
+            left = ~read
+        else:
+            values = np.empty((len(self.paths), mine.size))
+            header = np.full(mine.size, NO_STAMP, np.int64)
+            left = np.ones(mine.size, np.bool_)
         if self.recognise is not None:
             self._take_layouts(
                 block, self.recognise, begin=begin, length=length, left=left, values=values, header=header
             )
-        if self.json is not None:
-            read, values, header = self.json.read(block.data, begin, length)
-            left = ~read
         for k in np.flatnonzero(left).tolist():
             raw = block.data[int(begin[k]) : int(begin[k] + length[k])].tobytes()
             message = self.decode(raw)
             values[:, k] = [resolve(message, path) for path in self.paths]
             header[k] = header_stamp(message)
             if self.clock is not None:
-                self.ticks.append(_exact(resolve_exactly(message, self.clock)))
+                self.ticks.append(resolve_exactly(message, self.clock))
             self.singly += 1
         self.columns = self.columns or [[] for _ in self.paths]
         for column, row in zip(self.columns, values, strict=True):
@@ -247,8 +255,10 @@ class _ChannelReader:
 
     def topic(self) -> Topic:
         """All that was gathered; the blocks are let go as they are joined, column by column."""
-        values = {path.text: _joined(column) for path, column in zip(self.paths, self.columns, strict=True)}
-        log_time, publish_time, header = (_joined(clock) for clock in self.clocks)
+        values = {
+            path.text: _run_together(column) for path, column in zip(self.paths, self.columns, strict=True)
+        }
+        log_time, publish_time, header = (_run_together(clock) for clock in self.clocks)
         return Topic(
             values=values,
             log_time=log_time,
@@ -258,11 +268,7 @@ class _ChannelReader:
         )
 
 
-def _joined(parts: list[NDArray[Any]]) -> NDArray[Any]:
+def _run_together(parts: list[NDArray[Any]]) -> NDArray[Any]:
     whole = np.concatenate(parts)
     parts.clear()
     return whole
-
-
-def _exact(value: Number) -> Decimal:
-    return Decimal(value.item() if isinstance(value, np.integer | np.floating) else value)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from data.mcap.fields import read_channel, read_schema
 from data.mcap.limits import DECLARED_BYTES, MOST_CHANNELS, MOST_DECLARATIONS, MOST_SCHEMAS, SCHEMA_TYPES
-from data.mcap.records import ByteArray, Damage, Tiling
+from data.mcap.records import HEADER, ByteArray, Damage, Tiling
 
 _DECLARES: Final = np.isin(np.arange(256), (Opcode.SCHEMA, Opcode.CHANNEL))  # by opcode
 _LONGEST_STRETCH: Final = 8 << 20  # [bytes] of declarations that are remembered as a whole
@@ -49,7 +49,7 @@ class Declarations:
         first, last = int(places[0]), int(places[-1])
         together = last - first + 1 == places.size
         ends = int(tiling.begin[last] + tiling.length[last])
-        stretch = data.data[int(tiling.begin[first]) - 9 : ends] if together else data.data[:0]
+        stretch = data.data[int(tiling.begin[first]) - HEADER.size : ends] if together else data.data[:0]
         if together and len(stretch) <= _LONGEST_STRETCH:
             if stretch == self._stretch:
                 return []

@@ -73,30 +73,21 @@ def resolve(message: object, path: FieldPath) -> float:
         When a field is missing, an element is not there, or the end is no number.
     """
     try:
-        return float(resolve_exactly(message, path))
+        return float(_found(message, path))
     except OverflowError as error:
         raise LogError(f"{path.text} holds an integer too large for a float") from error
 
 
-def resolve_exactly(message: object, path: FieldPath) -> Number:
-    """The number that the path leads to, as the decoder gives it.
+def resolve_exactly(message: object, path: FieldPath) -> Decimal:
+    """The number that the path leads to, to its last digit.
 
     Raises
     ------
     LogError
         As `resolve`.
     """
-    here = message
-    for step in path.steps:
-        fields = _fields(here)
-        if step.name not in fields:
-            raise LogError(
-                f"{path.text}: the messages have no field {step.name!r} there; they have "
-                f"{nearest(step.name, fields)}"
-            )
-        inside = fields[step.name]
-        here = inside if step.index is None and step.joint is None else _element(inside, fields, step, path)
-    return number(here, path.text)
+    found = _found(message, path)
+    return Decimal(found.item() if isinstance(found, np.integer | np.floating) else found)
 
 
 def number(value: object, path: str) -> Number:
@@ -128,6 +119,20 @@ def leaves(message: object, prefix: str = "", depth: int = 0) -> Iterator[tuple[
             yield from leaves(value, f"{path}.", depth + 1)
         else:
             yield path, value
+
+
+def _found(message: object, path: FieldPath) -> Number:
+    here = message
+    for step in path.steps:
+        fields = _fields(here)
+        if step.name not in fields:
+            raise LogError(
+                f"{path.text}: the messages have no field {step.name!r} there; they have "
+                f"{nearest(step.name, fields)}"
+            )
+        inside = fields[step.name]
+        here = inside if step.index is None and step.joint is None else _element(inside, fields, step, path)
+    return number(here, path.text)
 
 
 def _element(inside: object, fields: Mapping[str, object], step: Step, path: FieldPath) -> object:

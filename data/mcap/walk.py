@@ -31,7 +31,6 @@ from data.mcap.credible import Surroundings, follows, message_begins, surroundin
 from data.mcap.declarations import Declarations
 from data.mcap.fields import Fields, read_metadata
 from data.mcap.limits import (
-    CHUNK_RECORDS,
     METADATA_BYTES,
     MOST_ATTACHMENTS,
     MOST_METADATA,
@@ -209,8 +208,6 @@ class McapWalk:
     def _within(self, data: ByteArray, record: tuple[int, int], *, checked: bool) -> Block | None:
         """The messages of a chunk's content; `record`: where the chunk stands in the file."""
         tiling = tile(data, large=self.large)
-        if tiling.opcode.size > CHUNK_RECORDS:
-            raise Damage(record[0], f"more than {CHUNK_RECORDS} records")
         dropped = [refused(tiling, *one) for one in self._declared.take(data, tiling)]
         return self._block(data, tiling, dropped, record=record, checked=checked)
 

@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from data.csv.layout import bare, declared_unit
+from data.columns import bare, called, declared_unit
 from data.findings import LogError
 from data.integrity import Checksums, Integrity, Loss
 from data.mcap.records import ByteArray
@@ -91,9 +91,7 @@ class ParquetLog:
         """A column by its exact name, its name without the unit, or its number from 0; raises LogError."""
         names = [column.name.strip() for column in self.columns]
         if isinstance(source, str):
-            wanted = source.strip()
-            matching = [k for k, name in enumerate(names) if name == wanted]
-            matching = matching or [k for k, name in enumerate(names) if bare(name) == wanted]
+            matching = called(names, source)
             if len(matching) > 1:
                 raise LogError(f"{len(matching)} columns are called {shown(source)!r}; rename them")
             if matching:

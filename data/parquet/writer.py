@@ -11,8 +11,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
+from data.columns import require_one_length
 from data.files import write_atomically
-from data.findings import LogError
 
 FloatArray = NDArray[np.float64]
 
@@ -42,9 +42,7 @@ def write_parquet(
     LogError
         When the arrays differ in length.
     """
-    lengths = {name: array.shape for name, array in columns.items()}
-    if len(set(lengths.values())) > 1 or any(len(shape) != 1 for shape in lengths.values()):
-        raise LogError(f"{path.name}: the columns to write differ in shape: {lengths}")
+    require_one_length(path, columns)
     said = units or {}
     schema = pa.schema(
         [

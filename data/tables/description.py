@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from data.clocks import ClockReport, clock_report
+from data.columns import value_range
 from data.findings import LogError
 from data.integrity import Integrity
 from data.tables.table import Column, TableFile, Values
@@ -63,16 +64,7 @@ def _column(k: int, column: Column, values: Values | None) -> DescribedColumn:
         found = values.floats()
     except LogError as error:
         return DescribedColumn(k, column.name, column.unit, None, None, 0, column.rows, str(error))
-    finite = found[np.isfinite(found)]
-    return DescribedColumn(
-        number=k,
-        header=column.name,
-        unit=column.unit,
-        low=float(finite.min()) if finite.size else None,
-        high=float(finite.max()) if finite.size else None,
-        missing=int(found.size - finite.size),
-        rows=int(found.size),
-    )
+    return DescribedColumn(k, column.name, column.unit, *value_range(found), found.size)
 
 
 def _clock(table: TableFile, values: Mapping[int, Values]) -> tuple[ClockReport | None, str | None]:

@@ -14,12 +14,13 @@ from typing import Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from data import columns
 from data.findings import LogError
 from data.integrity import Integrity
 from data.names import shown
 
 FloatArray = NDArray[np.float64]
-TIME_NAMES: Final = ("t", "time", "__time", "timestamp", "tout")  # columns that are plainly the time
+TIME_NAMES: Final = (*columns.TIME_NAMES, "tout")  # Simulink's too
 _WHOLE: Final = 2**53  # up to which every integer is a float
 
 

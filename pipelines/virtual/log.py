@@ -59,9 +59,14 @@ def write_log(
         kind = log_format(path)
         signals = look.signals.of(kind)
         if kind == "csv":
-            _write_csv(path, look, signals, values, labelled)
+            _require_written(signals.dialect or CsvDialect())
+            columns, _ = _columns(look, signals, values)
+            write_csv(
+                path, columns={n: np.round(array, 12) for n, array in columns.items()}, metadata=labelled
+            )
         elif kind == "parquet":
-            _write_parquet(path, look, signals, values, labelled)
+            columns, units = _columns(look, signals, values)
+            write_parquet(path, columns=columns, units=units, metadata=labelled)
         elif kind == "mcap":
             _write_mcap(path, look, signals, values, labelled)
         else:
@@ -90,33 +95,13 @@ def _named(signals: Signals, quantity: Quantity) -> Signal | None:
     return found
 
 
-def _write_csv(
-    path: Path,
-    look: Look,
-    signals: Signals,
-    values: Mapping[Quantity, FloatArray],
-    metadata: Mapping[str, str],
-) -> None:
-    asked = asdict(signals.dialect or CsvDialect())
-    strange = next((key for key, value in asked.items() if value not in _WRITTEN[key]), None)
+def _require_written(dialect: CsvDialect) -> None:
+    strange = next((key for key, value in asdict(dialect).items() if value not in _WRITTEN[key]), None)
     if strange is not None:
         raise LogError(
             "the virtual rig writes CSV with commas, decimal points and a header, in UTF-8; leave "
             f"`{strange}` out of `dialect`"
         )
-    columns, _ = _columns(look, signals, values)
-    write_csv(path, columns={name: np.round(array, 12) for name, array in columns.items()}, metadata=metadata)
-
-
-def _write_parquet(
-    path: Path,
-    look: Look,
-    signals: Signals,
-    values: Mapping[Quantity, FloatArray],
-    metadata: Mapping[str, str],
-) -> None:
-    columns, units = _columns(look, signals, values)
-    write_parquet(path, columns=columns, units=units, metadata=metadata)
 
 
 def _columns(
