@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Final
 
@@ -124,6 +125,7 @@ def unpack(content: ByteArray, head: ChunkHead, *, unpacked_before: int) -> Byte
         raise Damage(where, f"a chunk unpacks to {block.size} bytes or more, it declares {size}")
     if head.checksum and zlib.crc32(block.data) != head.checksum:
         raise Damage(where, "a chunk's checksum differs from its content")
+    block.flags.writeable = False  # compiled code is made for one kind of array
     return block
 
 
@@ -144,6 +146,10 @@ def _decompress(packed: ByteArray, head: ChunkHead) -> ByteArray:
 
 def _unzstd(packed: ByteArray, limit: int) -> ByteArray:
     machine = zstandard.ZstdDecompressor(max_window_size=_WINDOW_CAP)
+    frame = zstandard.get_frame_parameters(packed.data)
+    if frame.content_size == limit - 1 and frame.window_size <= _WINDOW_CAP:  # takes no more than declared
+        with suppress(zstandard.ZstdError):  # several frames, perhaps
+            return np.frombuffer(machine.decompress(packed.data, allow_extra_data=False), np.uint8)
     block, found = np.empty(limit, np.uint8), 0  # pages that are never written cost nothing
     with machine.stream_reader(packed.data, read_across_frames=True) as stream:
         while found < limit and (count := stream.readinto(block[found:].data)):

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from mcap.records import Channel
@@ -22,9 +22,10 @@ from numpy.typing import NDArray
 
 from data.findings import LogError
 from data.integrity import Integrity
-from data.mcap.decoding import Decode, Recognise, decoder, recogniser
+from data.mcap.decoding import Decode, decoder, recogniser
 from data.mcap.field_path import FieldPath, resolve, resolve_exactly
-from data.mcap.layout import Layout, Place, numbers, place, prove, stamps
+from data.mcap.layout import Taken
+from data.mcap.layout_reader import LayoutReader
 from data.mcap.records import ByteArray
 from data.mcap.stamp import NO_STAMP, header_stamp
 from data.mcap.walk import Block, McapWalk
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 TimeArray = NDArray[np.int64]
-_MOST_LAYOUTS = 16  # of one topic, before its messages are decoded one by one
+_LARGE: Final = 4 << 20  # [bytes] of a file that is worth loading compiled code
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def read_columns(
         When a topic is missing, declared on two channels at once, in an unread encoding, or a field is not a
         number in it. A damaged file is no error here: see `McapColumns.integrity`.
     """
-    walk = McapWalk(content)
+    walk = McapWalk(content, compiled=content.size > _LARGE)
     paths: dict[str, list[FieldPath]] = {}
     for path in wanted:
         paths.setdefault(path.topic, []).append(path)
@@ -106,7 +107,7 @@ def read_columns(
 
 def survey(content: ByteArray) -> Integrity:
     """What is proved of a file's bytes, whatever its messages hold."""
-    walk = McapWalk(content)
+    walk = McapWalk(content, compiled=False)
     for _ in walk.blocks():
         pass
     return walk.integrity
@@ -130,11 +131,12 @@ def _reader(
     decode = decoder(channel, schema, exact=clock is not None)
     if clock is not None:
         return _ChannelReader(paths, decode, clock=clock)
-    if channel.message_encoding == "json" and walk.large:
+    if channel.message_encoding == "json" and walk.compiled:
         from data.mcap.json_layout import JsonReader  # noqa: PLC0415  # numba takes long to load
 
-        return _ChannelReader(paths, decode, json=JsonReader(paths))
-    return _ChannelReader(paths, decode, recognise=recogniser(channel, schema), large=walk.large)
+        return _ChannelReader(paths, decode, JsonReader(paths))
+    recognise = recogniser(channel, schema)
+    return _ChannelReader(paths, decode, recognise and LayoutReader(paths, recognise, compiled=walk.compiled))
 
 
 def joined(topic: str, parts: Sequence[Topic], declared: Sequence[str]) -> Topic:
@@ -174,84 +176,33 @@ class _ChannelReader:
 
     paths: list[FieldPath]
     decode: Decode
-    recognise: Recognise | None = None  # how a layout is found, where one may be proved
-    json: JsonReader | None = None  # reads a block at once
+    reader: LayoutReader | JsonReader | None = None  # reads a block at once
     clock: FieldPath | None = None  # which of the paths is the time
-    large: bool = False  # whether the file is worth compiled code
     singly: int = 0
-    layouts: list[tuple[Layout, list[Place]]] = field(default_factory=list)
     columns: list[list[FloatArray]] = field(default_factory=list)  # of each path, a block each
     clocks: list[list[TimeArray]] = field(default_factory=lambda: [[], [], []])  # log, publish, header
     ticks: list[Decimal] = field(default_factory=list)
 
     def take(self, block: Block, number: int) -> None:
         """Read this channel's messages of a block."""
-        found = block.messages
-        mine = np.flatnonzero(found.channel == number)
-        begin, length = found.begin[mine], found.length[mine]
-        if self.json is not None:
-            read, values, header = self.json.read(block.data, begin, length)
-            left = ~read
+        found = block.messages.of(number)
+        if self.reader is not None:
+            taken = self.reader.read(block.data, found.begin, found.length)
         else:
-            values = np.empty((len(self.paths), mine.size))
-            header = np.full(mine.size, NO_STAMP, np.int64)
-            left = np.ones(mine.size, np.bool_)
-        if self.recognise is not None:
-            self._take_layouts(
-                block, self.recognise, begin=begin, length=length, left=left, values=values, header=header
-            )
-        for k in np.flatnonzero(left).tolist():
-            raw = block.data[int(begin[k]) : int(begin[k] + length[k])].tobytes()
+            taken = Taken.nothing(len(self.paths), found.begin.size)
+        for k in np.flatnonzero(taken.left).tolist():
+            raw = block.data[int(found.begin[k]) : int(found.begin[k] + found.length[k])].tobytes()
             message = self.decode(raw)
-            values[:, k] = [resolve(message, path) for path in self.paths]
-            header[k] = header_stamp(message)
+            taken.values[:, k] = [resolve(message, path) for path in self.paths]
+            taken.header[k] = header_stamp(message)
             if self.clock is not None:
                 self.ticks.append(resolve_exactly(message, self.clock))
             self.singly += 1
         self.columns = self.columns or [[] for _ in self.paths]
-        for column, row in zip(self.columns, values, strict=True):
+        for column, row in zip(self.columns, taken.values, strict=True):
             column.append(row.copy())
-        for clock, own in zip(
-            self.clocks, (found.log_time[mine], found.publish_time[mine], header), strict=True
-        ):
+        for clock, own in zip(self.clocks, (found.log_time, found.publish_time, taken.header), strict=True):
             clock.append(own)
-
-    def _take_layouts(
-        self,
-        block: Block,
-        recognise: Recognise,
-        *,
-        begin: NDArray[np.int64],
-        length: NDArray[np.int64],
-        left: NDArray[np.bool_],
-        values: FloatArray,
-        header: TimeArray,
-    ) -> None:
-        """Take the messages that a layout can be proved of; `left` keeps the others."""
-        tried = 0
-        while left.any() and tried < _MOST_LAYOUTS:
-            if tried == len(self.layouts):
-                k = int(np.argmax(left))
-                shape = recognise(block.data[int(begin[k]) : int(begin[k] + length[k])].tobytes())
-                places = [place(shape, path) for path in self.paths] if shape is not None else []
-                known = [own for own in places if own is not None]
-                if shape is None or len(known) < len(self.paths):
-                    return
-                self.layouts.append((shape, known))
-            shape, known = self.layouts[tried]
-            tried += 1
-            candidates = np.flatnonzero(left & (length == shape.size))
-            proved = prove(shape, block.data, begin[candidates], large=self.large)
-            candidates = candidates[proved]
-            if not candidates.size:
-                continue
-            where = begin[candidates]
-            for row, own in enumerate(known):
-                values[row, candidates] = numbers(block.data, where, own)
-            stamped = stamps(shape, block.data, where)
-            if stamped is not None:
-                header[candidates] = stamped
-            left[candidates] = False
 
     def topic(self) -> Topic:
         """All that was gathered; the blocks are let go as they are joined, column by column."""

@@ -20,12 +20,11 @@ from mcap_ros2.decoder import DecoderFactory
 
 from data.findings import LogError
 from data.mcap import ros1, ros_layout
-from data.mcap.layout import Layout
+from data.mcap.layout_reader import Recognise
 from data.mcap.ros_definitions import Dialect, Field, parse_definition
 from data.names import shown
 
 Decode = Callable[[bytes], object]
-Recognise = Callable[[bytes], Layout | None]
 _DIALECTS: Final[dict[str, Dialect]] = {"cdr": "ros2", "ros1": "ros1"}
 _READ: Final = "cdr with ros2msg, ros1 with ros1msg, protobuf, or json"
 

@@ -22,13 +22,14 @@ from data.mcap.attachments import AttachmentLabel
 from data.mcap.columns import run_metadata
 from data.mcap.decoding import decoder, recogniser
 from data.mcap.field_path import leaves
-from data.mcap.layout import Layout, prove, stamps
+from data.mcap.layout import Layout, Taken, take
 from data.mcap.records import ByteArray
 from data.mcap.stamp import NO_STAMP
 from data.mcap.walk import Block, McapWalk
 
 MOST_LISTED: Final = 500  # channels
 _MOST_FIELDS: Final = 200
+_LARGE: Final = 256 << 20  # [bytes] of a file that is worth loading compiled code
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ class _Seen:
 
 def describe(content: ByteArray) -> McapDescription:
     """Describe a file's bytes. Damage is no error here: see its `integrity`."""
-    walk = McapWalk(content)
+    walk = McapWalk(content, compiled=content.size > _LARGE)
     seen: dict[int, _Seen] = {}
     found = np.zeros(1 << 16, np.bool_)
     for block in walk.blocks():
@@ -131,13 +132,12 @@ def _take(walk: McapWalk, block: Block, number: int, mine: NDArray[np.intp], see
     part.log.append(found.log_time[mine])
     if part.layout is None:
         return
-    own = None
-    if np.all(length == part.layout.size) and prove(part.layout, block.data, begin, large=walk.large).all():
-        own = stamps(part.layout, block.data, begin)
-    if own is None or np.any(own == NO_STAMP):
+    taken = Taken.nothing(0, begin.size)
+    take(part.layout, (), block.data, (begin, length), taken, compiled=walk.compiled)
+    if taken.left.any() or np.any(taken.header == NO_STAMP):
         part.layout, part.header = None, []
     else:
-        part.header.append(own)
+        part.header.append(taken.header)
 
 
 def _channel(part: _Seen) -> ChannelDescription:

@@ -18,12 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data.mcap.field_path import FieldPath
-from data.mcap.json_scan import POWERS, match
-from data.mcap.layout import Layout, Leaf, place, stamp_places
+from data.mcap.json_scan import POWERS, take
+from data.mcap.layout import Layout, Leaf, Taken, place, stamp_places
 from data.mcap.records import ByteArray
-from data.mcap.stamp import LATEST, NO_STAMP
+from data.mcap.stamp import LATEST
 
-FloatArray = NDArray[np.float64]
 _TOKEN: Final = re.compile(
     rb'[ \t\n\r]*(?:([\[\]{}:,])|("(?:[^"\\\x00-\x1f]|\\.)*")|(-?\d[-+.\deE]*)|(true|false|null))'
 )
@@ -37,10 +36,10 @@ class _Shape:
     """A text: what lies between its numbers, and which of them are wanted."""
 
     text: ByteArray
-    edges: NDArray[np.int64]  # (k + 2,) of the pieces between k numbers
-    slot: NDArray[np.int64]  # (k,) row that a number goes to, or -1
-    rows: tuple[int, ...]  # of the paths
-    stamp: tuple[int, int] | None  # rows of seconds and nanoseconds
+    edges: NDArray[np.uint64]  # (k + 2,) of the pieces between k numbers
+    slot: NDArray[np.int64]  # (k,) what a number is kept as, or -1
+    rows: NDArray[np.int64]  # (p,) what those of the paths are kept as
+    stamp: NDArray[np.int64]  # (2 or 0,) what seconds and nanoseconds are kept as
 
 
 class JsonReader:
@@ -50,13 +49,10 @@ class JsonReader:
         self._paths = paths
         self._shapes: list[_Shape] = []
 
-    def read(
-        self, block: ByteArray, begin: NDArray[np.int64], length: NDArray[np.int64]
-    ) -> tuple[NDArray[np.bool_], FloatArray, NDArray[np.int64]]:
-        """Which messages (n,) could be read, their numbers (paths, n) and stamps (n,) [ns]."""
-        values = np.empty((len(self._paths), begin.size))
-        stamp = np.full(begin.size, NO_STAMP, np.int64)
-        left, tried = np.ones(begin.size, np.bool_), 0
+    def read(self, block: ByteArray, begin: NDArray[np.int64], length: NDArray[np.int64]) -> Taken:
+        """What can be read of the messages (n,) at `begin`."""
+        taken, tried = Taken.nothing(len(self._paths), begin.size), 0
+        left = taken.left
         while left.any() and tried < _MOST_LAYOUTS:
             if tried == len(self._shapes):
                 k = int(np.argmax(left))
@@ -65,33 +61,26 @@ class JsonReader:
                 if shape is None:
                     break
                 self._shapes.append(shape)
-            own = np.flatnonzero(left)
             shape = self._shapes[tried]
             tried += 1
-            numbers, integers, same = _matched(shape, block, begin[own], length[own])
-            own = own[same]
-            values[:, own] = numbers[list(shape.rows)][:, same]
-            if shape.stamp is not None:
-                stamp[own] = _stamps(integers[list(shape.stamp)][:, same])
-            left[own] = False
-        return ~left, values, stamp
-
-
-def _matched(
-    shape: _Shape, block: ByteArray, begin: NDArray[np.int64], length: NDArray[np.int64]
-) -> tuple[FloatArray, NDArray[np.int64], NDArray[np.bool_]]:
-    wanted = int(shape.slot.max(initial=-1)) + 1
-    bits = np.zeros((wanted, begin.size), np.uint64)
-    integers, same = np.zeros((wanted, begin.size), np.int64), np.zeros(begin.size, np.bool_)
-    match(block, begin, length, shape.text, shape.edges, shape.slot, bits, integers, POWERS, same)
-    return bits.view(np.float64), integers, same
-
-
-def _stamps(parts: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Stamps (n,) [ns] from seconds and nanoseconds (2, n), as `stamp.stamp_of` has them."""
-    sane = np.all((parts >= -LATEST) & (parts <= LATEST), axis=0)
-    whole, part = np.where(sane, parts, 0)
-    return np.where(sane, whole * 1_000_000_000 + part, NO_STAMP)
+            take(
+                block,
+                begin,
+                length,
+                shape.text,
+                shape.edges,
+                shape.slot,
+                shape.rows,
+                shape.stamp,
+                LATEST,
+                np.empty(shape.slot.size, np.uint64),
+                np.empty(shape.slot.size, np.int64),
+                POWERS,
+                left,
+                taken.values,
+                taken.header,
+            )
+        return taken
 
 
 def _shape_of(raw: bytes, paths: Sequence[FieldPath]) -> _Shape | None:
@@ -120,8 +109,8 @@ def _shape_of(raw: bytes, paths: Sequence[FieldPath]) -> _Shape | None:
     pieces = [raw[end:start] for end, start in zip(ends.tolist(), starts.tolist(), strict=True)]
     edges = np.concatenate([[0], np.cumsum(starts - ends)])
     text = np.frombuffer(b"".join(pieces), np.uint8)
-    stamp = None if own_stamp is None else (rows[-2], rows[-1])
-    return _Shape(text, edges.astype(np.int64), slot, tuple(rows[: len(paths)]), stamp)
+    kept = np.array(rows, np.int64)
+    return _Shape(text, edges.astype(np.uint64), slot, kept[: len(paths)], kept[len(paths) :])
 
 
 class _UnlikeError(Exception):

@@ -2,16 +2,17 @@
 
 Binary messages can be read as an array where every one of them is proved to have the same shape. A `Layout`
 is that shape, as one message showed it: the bits that must be the same in all (lengths, counts, tags, text),
-and for each number its place. `prove` compares those bits message by message; a size proves nothing, since
+and for each number its place. `take` compares those bits message by message; a size proves nothing, since
 two texts of different length can give messages of one size. What fits no layout goes through the ordinary
 decoder. How a shape is recognised is a matter of the encoding (`ros_layout`, `protobuf_layout`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from functools import cached_property
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ FloatArray = NDArray[np.float64]
 Fixed = Literal["f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"]  # little-endian
 Variable = Literal["int32", "uint32", "sint32", "int64", "uint64", "sint64"]  # seven bits a byte, as protobuf
 Kind = Fixed | Variable
+_WORD: Final = 8  # [bytes] that compiled code compares at once
+KINDS: Final[tuple[Kind, ...]] = (*get_args(Fixed), *get_args(Variable))  # in the order of `scan`
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,16 @@ class Layout:
     def size(self) -> int:
         """Bytes in a message."""
         return self.template.size
+
+    @cached_property
+    def proof(self) -> NDArray[np.uint64]:
+        """The words of eight bytes in which anything is fixed: offset, bits and mask (w, 3)."""
+        offsets = np.append(np.arange(0, self.size - _WORD, _WORD), self.size - _WORD)
+        words = [
+            np.array([own[k : k + _WORD] for k in offsets]).view("<u8") for own in (self.template, self.mask)
+        ]
+        rows = np.column_stack([offsets.astype(np.uint64), *words])
+        return np.ascontiguousarray(rows[rows[:, 2] != 0])
 
 
 @dataclass(frozen=True)
@@ -89,30 +102,83 @@ def _element(layout: Layout, key: str, index: int | None) -> Place | None:
     return Place(leaf.offset + leaf.width * (index or 0), leaf.kind, leaf.width)
 
 
-def prove(layout: Layout, block: ByteArray, begin: NDArray[np.int64], *, large: bool) -> NDArray[np.bool_]:
-    """For each message of the layout's size at `begin` (n,), whether its bits are the layout's: (n,)."""
-    if large:
-        from data.mcap.scan import prove as compiled  # noqa: PLC0415  # see `records.tile`
+@dataclass(frozen=True)
+class Taken:
+    """What is read of n messages: which of them are not read yet, and the numbers of the others."""
 
-        same = np.empty(begin.size, np.bool_)
-        compiled(block, begin, layout.template, layout.mask, same)
-        return same
-    rows = gather(block, begin, layout.size)
-    return np.asarray(~np.any((rows ^ layout.template) & layout.mask, axis=1))
+    left: NDArray[np.bool_]  # (n,)
+    values: FloatArray  # (places, n) [as logged]
+    header: NDArray[np.int64]  # (n,) [ns] stamps, `NO_STAMP` where there is none
 
-
-def numbers(block: ByteArray, begin: NDArray[np.int64], where: Place) -> FloatArray:
-    """The numbers (n,) at a place of the messages at `begin` (n,), as the ordinary decoder gives them."""
-    return _integers(block, begin, where).astype(np.float64)
+    @classmethod
+    def nothing(cls, places: int, messages: int) -> Taken:
+        """All messages are left."""
+        header = np.full(messages, NO_STAMP, np.int64)
+        return cls(np.ones(messages, np.bool_), np.empty((places, messages)), header)
 
 
-def stamps(layout: Layout, block: ByteArray, begin: NDArray[np.int64]) -> NDArray[np.int64] | None:
-    """Stamps (n,) [ns] of the messages at `begin` (n,), `NO_STAMP` where they are none; None without any."""
-    where = stamp_places(layout)
-    if where is None or "f" in where[0].kind + where[1].kind:
-        return None
-    whole, part = (_integers(block, begin, own).astype(np.int64) for own in where)
-    sane = (np.abs(whole) <= LATEST) & (np.abs(part) <= LATEST)
+def take(
+    layout: Layout,
+    places: Sequence[Place],
+    block: ByteArray,
+    messages: tuple[NDArray[np.int64], NDArray[np.int64]],
+    taken: Taken,
+    *,
+    compiled: bool,
+) -> None:
+    """Take the numbers at some places, as the ordinary decoder gives them, and the stamps.
+
+    Parameters
+    ----------
+    layout, places
+        Of one shape of message.
+    block, messages
+        Bytes, and where messages (n,) begin and how long they are.
+    taken
+        Written to, for those that are left and whose bits are proved to be the layout's.
+    compiled
+        Whether by compiled code, which takes long to load.
+    """
+    own = stamp_places(layout) or ()
+    own = own if all("f" not in part.kind for part in own) else ()
+    if compiled and layout.size >= _WORD:
+        from data.mcap import scan  # noqa: PLC0415  # see `records.tile`
+
+        scan.take(
+            block,
+            *messages,
+            layout.size,
+            layout.proof,
+            _table(places),
+            _table(own),
+            LATEST,
+            taken.left,
+            taken.values,
+            taken.header,
+        )
+        return
+    begin, length = messages
+    candidates = np.flatnonzero(taken.left & (length == layout.size))
+    rows = gather(block, begin[candidates], layout.size)
+    candidates = candidates[~np.any((rows ^ layout.template) & layout.mask, axis=1)]
+    where = begin[candidates]
+    for row, place_ in enumerate(places):
+        taken.values[row, candidates] = _stored(block, where, place_).astype(np.float64)
+    if own:
+        taken.header[candidates] = _stamps(block, where, own)
+    taken.left[candidates] = False
+
+
+def _table(places: Sequence[Place]) -> NDArray[np.int64]:
+    """Places as the rows of an array (n, 3)."""
+    rows = [(own.offset, own.width, KINDS.index(own.kind)) for own in places]
+    return np.array(rows, np.int64).reshape(-1, 3)
+
+
+def _stamps(block: ByteArray, begin: NDArray[np.int64], own: Sequence[Place]) -> NDArray[np.int64]:
+    """Stamps (n,) [ns] of the messages at `begin` (n,), `NO_STAMP` where they are none."""
+    whole, part = (_stored(block, begin, place_).astype(np.int64) for place_ in own)
+    sane = (whole >= -LATEST) & (whole <= LATEST) & (part >= -LATEST) & (part <= LATEST)
     return np.where(sane, np.where(sane, whole, 0) * 1_000_000_000 + part, NO_STAMP)
 
 
@@ -131,7 +197,7 @@ def stamp_places(layout: Layout) -> tuple[Place, Place] | None:
     return None
 
 
-def _integers(block: ByteArray, begin: NDArray[np.int64], where: Place) -> NDArray[Any]:
+def _stored(block: ByteArray, begin: NDArray[np.int64], where: Place) -> NDArray[Any]:
     """Numbers (n,) as they are stored."""
     if not where.width:
         return np.zeros(begin.size, np.int64)

@@ -8,6 +8,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from data.integrity import Checksums, Integrity, Loss
 from data.mcap.limits import MOST_LOSSES
 from data.mcap.records import Messages
@@ -71,14 +74,14 @@ class Proofs:
     def count(self, found: Messages, losses: list[tuple[Loss, bool]], *, checked: bool) -> None:
         """Take in a block's messages, and the losses among them with whether each leaves a gap."""
         before = self._latest
-        timed = found.log_time[found.log_time > 0]
+        timed = _set(found.log_time)
         if timed.size:
             for k in self._waiting:
                 self._losses[k] = replace(self._losses[k], behind=int(timed.min()))
             self._waiting.clear()
             self._latest = int(timed.max())
             self.log = _wider(self.log, (int(timed.min()), self._latest))
-        published = found.publish_time[found.publish_time > 0]
+        published = _set(found.publish_time)
         if published.size:
             self.publish = _wider(self.publish, (int(published.min()), int(published.max())))
         for loss, gap in losses:
@@ -93,6 +96,11 @@ class Proofs:
     def prove_all(self) -> None:
         """A checksum holds for everything that came before."""
         self._proved, self._unproved = True, 0
+
+
+def _set(times: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The times that were set: those that are not 0."""
+    return times if times.size and times.min() > 0 else times[times > 0]
 
 
 def _wider(times: Times | None, more: Times) -> Times:

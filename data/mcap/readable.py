@@ -8,7 +8,7 @@ that message, not the block: the others are where they were.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -44,6 +44,8 @@ def readable(
     listed: list[Dropped],
     declared: Declarations,
     stand_in: Callable[[], None],
+    *,
+    compiled: bool,
 ) -> tuple[Messages, list[Dropped]]:
     """A block's messages on the declared channels, and what else was in it.
 
@@ -56,18 +58,18 @@ def readable(
     """
     dropped = _foreign(tiling)
     try:
-        found = messages(data, tiling)
+        found = messages(data, tiling, compiled=compiled)
     except Damage as damage:
         odd = _odd(data, tiling)
         dropped += [_stretch(tiling, run, damage.why) for run in _runs(odd)]
-        found = messages(data, _without(tiling, odd))
+        found = messages(data, _without(tiling, odd), compiled=compiled)
     known = declared.declared[found.channel]
     if not known.all():
         stand_in()
         known = declared.declared[found.channel]
     if not known.all():
         dropped += _undeclared(found, known, declared)
-        found = _kept(found, known)
+        found = found.where(known)
     return found, [_placed(one, found) for one in (*listed, *dropped)]
 
 
@@ -161,7 +163,3 @@ def _runs(mask: NDArray[np.bool_]) -> list[tuple[int, int]]:
 def _without(tiling: Tiling, odd: NDArray[np.bool_]) -> Tiling:
     kept = ~odd
     return Tiling(tiling.opcode[kept], tiling.begin[kept], tiling.length[kept], tiling.end)
-
-
-def _kept(found: Messages, known: NDArray[np.bool_]) -> Messages:
-    return Messages(**{part.name: getattr(found, part.name)[known] for part in fields(found)})

@@ -11,10 +11,11 @@ becomes a `Damage` with the place. Source: https://mcap.dev/spec (version 0).
 from __future__ import annotations
 
 import struct
+from array import array
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields
 from io import BytesIO
-from typing import Final, TypeVar
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from mcap.data_stream import ReadDataStream
@@ -28,10 +29,10 @@ ByteArray = NDArray[np.uint8]
 Record = TypeVar("Record")
 HEADER: Final = struct.Struct("<BQ")
 MESSAGE_PREFIX: Final = 22  # channel, sequence, log time, publish time
-_PREFIX: Final = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<u8"), ("publish", "<u8")])
-_SMALL: Final = 1 << 20  # [bytes] that are stepped through without compiled code
-_FEW: Final = 256  # records that compiled code is not worth
-_LATEST: Final = np.iinfo(np.int64).max
+_PREFIX: Final = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<i8"), ("publish", "<i8")])
+_ALIKE: Final = 16  # records of one header in a row, after which more are sought at once
+_FIRST_LOOK: Final = 64  # records
+_LONGEST_LOOK: Final = 1 << 16  # records
 
 
 class Damage(Exception):  # noqa: N818  # what is found, not what went wrong in the program
@@ -65,6 +66,15 @@ class Messages:
     begin: NDArray[np.int64]
     length: NDArray[np.int64]
 
+    def of(self, channel: int) -> Messages:
+        """Those on one channel."""
+        mine = self.channel == channel
+        return self if mine.all() else self.where(mine)
+
+    def where(self, kept: NDArray[np.bool_]) -> Messages:
+        """Those that are kept (n,)."""
+        return Messages(**{part.name: getattr(self, part.name)[kept] for part in fields(self)})
+
 
 class _Exact(BytesIO):
     """Bytes that refuse to give fewer than were asked for."""
@@ -92,9 +102,9 @@ def parse(reader: Callable[[ReadDataStream], Record], content: bytes, *, where: 
 
 
 def tile(
-    block: ByteArray, *, begin: int = 0, within: frozenset[int] | None = None, large: bool = False
+    block: ByteArray, *, begin: int = 0, within: frozenset[int] | None = None, compiled: bool = False
 ) -> Tiling:
-    """Find the records of a block, from `begin` on; compiled where it, or the file that it is of, is `large`.
+    """Find the records of a block, from `begin` on, by `compiled` code or without loading any.
 
     With `within`, stop at the first record that is damaged or whose opcode is not among these.
 
@@ -105,49 +115,65 @@ def tile(
     """
     among = np.zeros(256, np.bool_)
     among[list(within) if within is not None else range(1, 256)] = True
-    if large:
-        tiling = _scanned(block, begin, among, whole=within is None)
-    else:
-        few = _FEW if block.size - begin > _SMALL else CHUNK_RECORDS
-        tiling = _stepped(block, begin, among, few)
-        if tiling.opcode.size == few:
-            tiling = _scanned(block, begin, among, whole=within is None)
+    tiling = (_scanned if compiled else _stepped)(block, begin, among)
     if within is None and tiling.end < block.size:
         why, _, _ = look(block.data, tiling.end, block.size)
         raise Damage(tiling.end, why or f"more than {CHUNK_RECORDS} records in one chunk")
     return tiling
 
 
-def _scanned(block: ByteArray, begin: int, among: NDArray[np.bool_], *, whole: bool) -> Tiling:
-    """As `_stepped`; where the `whole` block has to be records and is not, none but the place is told."""
+def _scanned(block: ByteArray, begin: int, among: NDArray[np.bool_]) -> Tiling:
+    """As `_stepped`, compiled."""
     from data.mcap.scan import scan  # noqa: PLC0415  # numba takes long to load
 
-    def pass_over(count: int) -> tuple[Tiling, int]:
-        found = Tiling(np.empty(count, np.uint8), np.empty(count, np.int64), np.empty(count, np.int64), 0)
-        seen, end = scan(block, begin, among, CHUNK_RECORDS, found.opcode, found.begin, found.length)
-        return replace(found, end=end), seen
-
-    nothing, count = pass_over(0)
-    return nothing if whole and nothing.end < block.size else pass_over(count)[0]
+    most = min((block.size - begin) // HEADER.size, CHUNK_RECORDS)  # what is never written costs nothing
+    opcode, start, length = np.empty(most, np.uint8), np.empty(most, np.int64), np.empty(most, np.int64)
+    count, end = scan(block, begin, among, opcode, start, length)
+    return Tiling(opcode[:count], start[:count], length[:count], end)
 
 
-def _stepped(block: ByteArray, begin: int, among: NDArray[np.bool_], most: int) -> Tiling:
-    raw, size, allowed = block.data, block.size, among.tolist()
-    opcodes = bytearray()
-    begins: list[int] = []
-    lengths: list[int] = []
-    here = begin
-    while here < size and len(begins) < most:
-        why, opcode, length = look(raw, here, size)
-        if why or not allowed[opcode]:
+def _stepped(block: ByteArray, begin: int, among: NDArray[np.bool_]) -> Tiling:
+    """Step from record to record; over records of one opcode and length, many at once."""
+    raw, last, allowed = block.data, block.size - HEADER.size, among.tolist()
+    opcodes, begins, lengths = bytearray(), array("q"), array("q")
+    here, alike, before = begin, 0, (-1, -1)
+    while here <= last and len(begins) < CHUNK_RECORDS:
+        opcode, length = own = HEADER.unpack_from(raw, here)
+        if not allowed[opcode] or length > last - here:
             break
-        opcodes.append(opcode)
-        begins.append(here + HEADER.size)
-        lengths.append(length)
-        here += HEADER.size + length
+        stride = HEADER.size + length
+        alike, before = (alike + 1 if own == before else 0), own
+        count = 1 if alike < _ALIKE else _row(block, here, stride, CHUNK_RECORDS - len(begins))
+        if count == 1:
+            opcodes.append(opcode)
+            begins.append(here + HEADER.size)
+            lengths.append(length)
+        else:
+            alike = 0
+            opcodes += bytes((opcode,)) * count
+            begins.frombytes((here + HEADER.size + stride * np.arange(count, dtype=np.int64)).tobytes())
+            lengths.frombytes(np.full(count, length, np.int64).tobytes())
+        here += count * stride
     return Tiling(
-        np.frombuffer(bytes(opcodes), np.uint8), np.array(begins, np.int64), np.array(lengths, np.int64), here
+        np.frombuffer(opcodes, np.uint8),
+        np.frombuffer(begins, np.int64),
+        np.frombuffer(lengths, np.int64),
+        here,
     )
+
+
+def _row(block: ByteArray, here: int, stride: int, most: int) -> int:
+    """How many records from `here` on have the header of the one there, and fit."""
+    fit, found, step = min((block.size - here) // stride, most), 1, _FIRST_LOOK
+    header = block[here : here + HEADER.size]
+    while found < fit:
+        step = min(step, fit - found)
+        rows = np.ndarray((step, HEADER.size), np.uint8, block, here + found * stride, (stride, 1))
+        same = (rows == header).all(axis=1)
+        if not same.all():
+            return found + int(np.argmin(same))
+        found, step = found + step, min(2 * step, _LONGEST_LOOK)
+    return found
 
 
 def look(raw: memoryview, here: int, size: int) -> tuple[str, int, int]:
@@ -163,8 +189,8 @@ def look(raw: memoryview, here: int, size: int) -> tuple[str, int, int]:
     return "", opcode, length
 
 
-def messages(block: ByteArray, tiling: Tiling) -> Messages:
-    """The messages among a block's records.
+def messages(block: ByteArray, tiling: Tiling, *, compiled: bool) -> Messages:
+    """The messages among a block's records; by `compiled` code or without.
 
     Raises
     ------
@@ -172,21 +198,36 @@ def messages(block: ByteArray, tiling: Tiling) -> Messages:
         When a message is shorter than its prefix, or a stamp lies past the year 2262.
     """
     mine = tiling.opcode == Opcode.MESSAGE
-    begin, length = tiling.begin[mine], tiling.length[mine]
+    begin, length = (tiling.begin, tiling.length) if mine.all() else (tiling.begin[mine], tiling.length[mine])
     if np.any(length < MESSAGE_PREFIX):
         raise Damage(int(begin[length < MESSAGE_PREFIX][0]), "a message is shorter than its own prefix")
-    prefix = gather(block, begin, MESSAGE_PREFIX).view(_PREFIX).reshape(-1)
-    for stamp in ("log", "publish"):
-        if np.any(prefix[stamp] > _LATEST):
-            raise Damage(int(begin[prefix[stamp] > _LATEST][0]), f"a message's {stamp} time is past 2262")
+    channel, sequence, log, publish = (_prefixes if compiled else _gathered)(block, begin)
+    for name, stamp in (("log", log), ("publish", publish)):
+        if np.any(stamp < 0):  # as an unsigned number, above 2^63 ns
+            raise Damage(int(begin[stamp < 0][0]), f"a message's {name} time is past 2262")
     return Messages(
-        channel=prefix["channel"],
-        log_time=prefix["log"].astype(np.int64),
-        publish_time=prefix["publish"].astype(np.int64),
-        sequence=prefix["sequence"],
+        channel=channel,
+        log_time=log,
+        publish_time=publish,
+        sequence=sequence,
         begin=begin + MESSAGE_PREFIX,
         length=length - MESSAGE_PREFIX,
     )
+
+
+def _prefixes(block: ByteArray, begin: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
+    """Channel, sequence, log and publish time (n,) of the messages at `begin` (n,), compiled."""
+    from data.mcap.scan import prefixes  # noqa: PLC0415  # numba takes long to load
+
+    found = tuple(np.empty(begin.size, _PREFIX[name]) for name in _PREFIX.fields or ())
+    prefixes(block, begin, *found)
+    return found
+
+
+def _gathered(block: ByteArray, begin: NDArray[np.int64]) -> tuple[NDArray[Any], ...]:
+    """As `_prefixes`, with whole arrays."""
+    prefix = gather(block, begin, MESSAGE_PREFIX).view(_PREFIX).reshape(-1)
+    return tuple(np.ascontiguousarray(prefix[name]) for name in _PREFIX.fields or ())
 
 
 def gather(block: ByteArray, begin: NDArray[np.int64], size: int) -> ByteArray:

@@ -24,8 +24,9 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Footer, Header, Metadata, Schema, Statistics
 
 from data.integrity import Integrity, Loss
+from data.mcap.ahead import Unpacking
 from data.mcap.attachments import AttachmentLabel, read_attachment
-from data.mcap.chunks import extent, read_head, unpack
+from data.mcap.chunks import extent, read_head
 from data.mcap.container import MAGIC
 from data.mcap.credible import Surroundings, follows, message_begins, surroundings
 from data.mcap.declarations import Declarations
@@ -49,7 +50,7 @@ _HINTS: Final = (
     Opcode.SUMMARY_OFFSET,
 )
 _PASSED: Final = frozenset({*map(int, _HINTS), *range(16, 256)})  # not needed here, or not known
-_LARGE: Final = 4 << 20  # [bytes]
+_AHEAD: Final = 4 << 20  # [bytes] of a file that is worth a thread
 _LONGEST_STATISTICS: Final = 46 + 10 * (1 << 16)  # [bytes]
 _SMALLEST_DISGUISED: Final = MESSAGE_PREFIX  # [bytes]
 _MOST_DISGUISED: Final = 10_000  # of a stretch that are looked through
@@ -65,24 +66,26 @@ class Block:
 
 
 class McapWalk:
-    """One walk through the bytes of one file: iterate `blocks` to the end, then read the rest.
+    """One walk through the bytes of one file, by `compiled` code or without loading any.
+
+    Iterate `blocks` to the end, then read the rest.
 
     `schemas` and `channels` hold all that a block needs by the time it is handed out.
     """
 
-    def __init__(self, content: ByteArray) -> None:
+    def __init__(self, content: ByteArray, *, compiled: bool) -> None:
         self.metadata: list[Metadata] = []
         self.attachments: list[AttachmentLabel] = []
         self.header = Header(profile="", library="")
         self.compressions: dict[str, int] = {}  # chunks by compression, "none" included
         self.indexed = False  # whether a summary stands at the end
-        self.large = content.size > _LARGE  # worth compiled code
+        self.compiled = compiled
         self._content = content
         self._declared = Declarations()
         self._seeker = Seeker(content)
         self._proofs = Proofs()
         self._statistics: bytes | None = None
-        self._unpacked = 0
+        self._unpacking = Unpacking(content, ahead=False)
         self._entries = 0  # of metadata
         self._metadata_bytes = 0
         self._loose = False  # whether messages stand outside chunks
@@ -115,6 +118,10 @@ class McapWalk:
 
     def blocks(self) -> Iterator[Block]:
         """The file's messages, block by block, in the order of the file."""
+        with Unpacking(self._content, ahead=self._content.size > _AHEAD) as self._unpacking:
+            yield from self._blocks()
+
+    def _blocks(self) -> Iterator[Block]:
         size = self._content.size
         here, ended = self._begin(), False
         while here < size and not ended:
@@ -186,8 +193,7 @@ class McapWalk:
             end = stated if agree else head.end
             if agree and head.credible:
                 resume = end
-            block = unpack(content, head, unpacked_before=self._unpacked)
-            self._unpacked += head.unpacked_size
+            block = self._unpacking.unpack(head)
             if not agree and not head.checksum:
                 raise Damage(begin, "a chunk's two lengths differ, and no checksum tells which is right")
         except Damage as damage:
@@ -207,16 +213,18 @@ class McapWalk:
 
     def _within(self, data: ByteArray, record: tuple[int, int], *, checked: bool) -> Block | None:
         """The messages of a chunk's content; `record`: where the chunk stands in the file."""
-        tiling = tile(data, large=self.large)
+        tiling = tile(data, compiled=self.compiled)
         dropped = [refused(tiling, *one) for one in self._declared.take(data, tiling)]
         return self._block(data, tiling, dropped, record=record, checked=checked)
 
     def _stretch(self, here: int) -> tuple[Block | None, int]:
         """The messages that stand outside chunks from `here` on, and where to go on."""
         content = self._content
-        tiling = tile(content[: here + STRETCH_BYTES], begin=here, within=BLOCK_OPCODES, large=self.large)
+        tiling = tile(
+            content[: here + STRETCH_BYTES], begin=here, within=BLOCK_OPCODES, compiled=self.compiled
+        )
         if not tiling.opcode.size:  # one record that is longer
-            tiling = tile(content, begin=here, within=BLOCK_OPCODES, large=self.large)
+            tiling = tile(content, begin=here, within=BLOCK_OPCODES, compiled=self.compiled)
         last = int(tiling.begin[-1]) - HEADER.size
         opcode = int(tiling.opcode[-1])
         own = opcode != Opcode.MESSAGE and exact(content, opcode, last + HEADER.size, tiling.end)
@@ -247,7 +255,9 @@ class McapWalk:
         checked: bool,
     ) -> Block | None:
         """A block's messages, if it has any. `record`: the chunk that it was in."""
-        found, lost = readable(data, tiling, dropped, self._declared, self._read_summary)
+        found, lost = readable(
+            data, tiling, dropped, self._declared, self._read_summary, compiled=self.compiled
+        )
         losses = [(_loss(one, record), one.gap) for one in lost]
         self._proofs.count(found, losses, checked=checked)
         where = record[0] if record else int(tiling.begin[0]) - HEADER.size
@@ -262,7 +272,7 @@ class McapWalk:
     def _pass_over(self, here: int) -> int:
         """Pass over indexes, and records of unknown opcodes; where to go on."""
         content = self._content
-        tiling = tile(content, begin=here, within=_PASSED, large=self.large)
+        tiling = tile(content, begin=here, within=_PASSED, compiled=self.compiled)
         near = self._near()
         starts = tiling.begin - HEADER.size
         large = np.flatnonzero(tiling.length >= _SMALLEST_DISGUISED)[:_MOST_DISGUISED]

@@ -38,11 +38,17 @@ def message(number: int, time: int, data: bytes, sequence: int = 0) -> bytes:
 
 
 def chunk(
-    content: bytes, *, compression: str = "", packed: bytes | None = None, size: int | None = None
+    content: bytes,
+    *,
+    compression: str = "",
+    packed: bytes | None = None,
+    size: int | None = None,
+    checksum: bool | None = None,
 ) -> bytes:
     body = content if packed is None else packed
+    checked = packed is None if checksum is None else checksum
     head = struct.pack(
-        "<QQQI", 0, 1, len(content) if size is None else size, zlib.crc32(content) if packed is None else 0
+        "<QQQI", 0, 1, len(content) if size is None else size, zlib.crc32(content) if checked else 0
     )
     return record(6, head + text(compression) + struct.pack("<Q", len(body)) + body)
 

@@ -22,11 +22,12 @@ from data.findings import LogError
 from data.mcap import protobuf, protobuf_layout, ros1, ros_layout
 from data.mcap.columns import read_columns
 from data.mcap.decoding import decoder
-from data.mcap.field_path import parse_path, resolve
+from data.mcap.field_path import FieldPath, parse_path, resolve
 from data.mcap.json_layout import JsonReader
 from data.mcap.json_scan import POWERS, nearest
-from data.mcap.layout import Layout, numbers, place, prove, stamps
-from data.mcap.records import _scanned, _stepped
+from data.mcap.layout import Layout, Taken, place, take
+from data.mcap.records import Damage, _scanned, _stepped, tile
+from data.mcap.records import messages as messages_of
 from data.mcap.ros_definitions import parse_definition
 from data.mcap.stamp import header_stamp
 from tests.data import hostile
@@ -48,17 +49,26 @@ def assert_same(
     layout: Layout, messages: Sequence[bytes], decoded: Sequence[object], paths: Sequence[str]
 ) -> None:
     """Numbers and stamps of messages that have a layout are those of the ordinary decoder."""
+    asked = [parse_path(f"/t:{text}") for text in paths]
+    expected = np.array([[resolve(message, path) for message in decoded] for path in asked])
+    for compiled in (False, True):
+        taken = taken_of(layout, messages, asked, compiled=compiled)
+        assert not taken.left.any()
+        np.testing.assert_array_equal(taken.values.view(np.int64), expected.view(np.int64))
+        assert taken.header.tolist() == [header_stamp(message) for message in decoded]
+
+
+def taken_of(
+    layout: Layout, messages: Sequence[bytes], paths: Sequence[FieldPath] = (), *, compiled: bool
+) -> Taken:
+    """What is taken of messages by a layout."""
     block, begin = block_of(messages)
-    for large in (False, True):
-        assert prove(layout, block, begin, large=large).all()
-    for text in paths:
-        path = parse_path(f"/t:{text}")
-        where = place(layout, path)
-        assert where is not None, text
-        expected = np.array([resolve(message, path) for message in decoded])
-        np.testing.assert_array_equal(numbers(block, begin, where).view(np.int64), expected.view(np.int64))
-    own = stamps(layout, block, begin)
-    assert own is None or own.tolist() == [header_stamp(message) for message in decoded]
+    length = np.array([len(message) for message in messages])
+    places = [own for path in paths if (own := place(layout, path)) is not None]
+    assert len(places) == len(paths)
+    taken = Taken.nothing(len(paths), len(messages))
+    take(layout, places, block, (begin, length), taken, compiled=compiled)
+    return taken
 
 
 # ROS 2 and ROS 1 ----------------------------------------
@@ -206,9 +216,8 @@ def test_every_fixed_byte_of_a_message_is_proved_and_no_other() -> None:
     for k in range(len(message)):
         mutant = bytearray(message)
         mutant[k] ^= 0x55
-        block, begin = block_of([bytes(mutant)])
-        for large in (False, True):
-            assert prove(layout, block, begin, large=large)[0] == (layout.mask[k] == 0)
+        for compiled in (False, True):
+            assert taken_of(layout, [bytes(mutant)], compiled=compiled).left[0] == (layout.mask[k] != 0)
 
 
 @pytest.mark.parametrize(
@@ -285,10 +294,9 @@ def test_protobuf_of_any_shape(drawn: list[Any]) -> None:
     decoded = [protobuf.decode(STATE, raw) for raw in messages]
     layout = protobuf_layout.recognise(STATE, messages[0])
     assert layout is not None
-    block, begin = block_of(messages)
-    alike = np.array([len(raw) == layout.size for raw in messages])
-    alike[alike] = prove(layout, block, begin[alike], large=False)
+    alike = ~taken_of(layout, messages, compiled=False).left
     assert alike[0]
+    assert alike.tolist() == (~taken_of(layout, messages, compiled=True).left).tolist()
     same = [raw for raw, own in zip(messages, alike, strict=True) if own]
     paths = [*KINDS, "motor.current", *(f"q[{k}]" for k in range(len(drawn[0].q)))]
     paths += [f"motors[{k}].current" for k in range(len(drawn[0].motors))]
@@ -352,13 +360,14 @@ def test_json_blocks_equal_pythons_own_parser(drawn: list[tuple[Any, Any, Any, i
         for q, x, i, sec, text in drawn
     ]  # fmt: skip
     paths = [parse_path(f"/t:{text}") for text in ("q[0]", "q{b}", "motor.current")]
-    read, values, stamp = JsonReader(paths).read(*json_block(messages))
+    taken = JsonReader(paths).read(*json_block(messages))
+    read = ~taken.left
     decoded = [json.loads(message) for message in messages]
     own = [message for message, ok in zip(decoded, read, strict=True) if ok]
-    for row, path in zip(values, paths, strict=True):
+    for row, path in zip(taken.values, paths, strict=True):
         expected = np.array([resolve(message, path) for message in own])
         np.testing.assert_array_equal(row[read].view(np.int64), expected.view(np.int64))
-    assert stamp[read].tolist() == [header_stamp(message) for message in own]
+    assert taken.header[read].tolist() == [header_stamp(message) for message in own]
 
 
 @settings(max_examples=1000, deadline=None)
@@ -379,9 +388,10 @@ def test_nearly_every_double_is_told_by_one_product() -> None:
     generator = np.random.default_rng(1)
     values = np.concatenate([generator.standard_normal(20_000), 10.0 ** generator.uniform(-290, 290, 20_000)])
     messages = [f'{{"q":{value!r}}}' for value in values.tolist()]
-    read, found, _ = JsonReader([parse_path("/t:q")]).read(*json_block(messages))
+    taken = JsonReader([parse_path("/t:q")]).read(*json_block(messages))
+    read = ~taken.left
     assert read.mean() > 0.999
-    np.testing.assert_array_equal(found[0][read].view(np.int64), values[read].view(np.int64))
+    np.testing.assert_array_equal(taken.values[0][read].view(np.int64), values[read].view(np.int64))
 
 
 @pytest.mark.parametrize(
@@ -390,22 +400,21 @@ def test_nearly_every_double_is_told_by_one_product() -> None:
      '{"q": [1]', '{"q": 1}{"q": 2}'],
 )  # fmt: skip
 def test_what_is_unlike_the_others_is_left_to_the_ordinary_decoder(odd: str) -> None:
-    read, values, _ = JsonReader([parse_path("/t:q")]).read(*json_block(['{"q": [1]}', odd, '{"q": [-2.5]}']))
-    assert read.tolist() == [True, False, True]
-    assert values[0][read].tolist() == [1.0, -2.5]
+    taken = JsonReader([parse_path("/t:q")]).read(*json_block(['{"q": [1]}', odd, '{"q": [-2.5]}']))
+    assert taken.left.tolist() == [False, True, False]
+    assert taken.values[0][~taken.left].tolist() == [1.0, -2.5]
 
 
 @pytest.mark.parametrize(
     "number", ["-0", "01", "1.", ".5", "1e", "+1", "1e400", "5e-324", "1" * 30, "0x1", "1_0"]
 )
 def test_odd_numbers_are_left_to_the_ordinary_decoder(number: str) -> None:
-    read, _, _ = JsonReader([parse_path("/t:q")]).read(*json_block(['{"q": 1}', f'{{"q": {number}}}']))
-    assert read.tolist() == [True, False]
+    taken = JsonReader([parse_path("/t:q")]).read(*json_block(['{"q": 1}', f'{{"q": {number}}}']))
+    assert taken.left.tolist() == [False, True]
 
 
 def test_equal_keys_are_left_to_the_ordinary_decoder() -> None:
-    read, _, _ = JsonReader([parse_path("/t:q")]).read(*json_block(['{"q": 1, "q": 2}']))
-    assert not read.any()
+    assert JsonReader([parse_path("/t:q")]).read(*json_block(['{"q": 1, "q": 2}'])).left.all()
 
 
 # Records ----------------------------------------
@@ -420,10 +429,46 @@ def test_the_compiled_scan_finds_what_the_plain_one_finds(
     block = np.frombuffer(raw + b"\0", np.uint8)[:-1]
     among = np.ones(256, np.bool_)
     among[[0, 13]] = False
-    plain, compiled = _stepped(block, 0, among, 1000), _scanned(block, 0, among, whole=False)
-    assert plain.end == compiled.end
+    plain, fast = _stepped(block, 0, among), _scanned(block, 0, among)
+    assert plain.end == fast.end
     for name in ("opcode", "begin", "length"):
-        assert getattr(plain, name).tolist() == getattr(compiled, name).tolist()
+        assert getattr(plain, name).tolist() == getattr(fast, name).tolist()
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.lists(
+        st.tuples(
+            st.integers(0, 2**16 - 1),
+            st.integers(0, 2**32 - 1),
+            st.integers(0, 2**63 + 1),
+            st.integers(0, 2**63 - 1),
+            st.binary(max_size=9),
+        ),
+        min_size=1,
+        max_size=9,
+    )
+)
+def test_the_compiled_prefixes_are_the_plain_ones(drawn: list[tuple[int, int, int, int, bytes]]) -> None:
+    raw = b"".join(
+        hostile.record(5, struct.pack("<HIQQ", channel, sequence, log, publish) + content)
+        for channel, sequence, log, publish, content in drawn
+    )
+    block = np.frombuffer(raw, np.uint8)
+    tiling = tile(block)
+    late = [log for _, _, log, _, _ in drawn if log >= 2**63]
+    for compiled in (False, True):
+        if late:
+            with pytest.raises(Damage, match="log time is past 2262"):
+                messages_of(block, tiling, compiled=compiled)
+            continue
+        found = messages_of(block, tiling, compiled=compiled)
+        columns = (found.channel, found.sequence, found.log_time, found.publish_time)
+        assert [tuple(int(own) for own in row) for row in zip(*columns, strict=True)] == [
+            row[:4] for row in drawn
+        ]
+        contents = [raw[b : b + n] for b, n in zip(found.begin, found.length, strict=True)]
+        assert contents == [row[4] for row in drawn]
 
 
 def test_nan_payloads_and_signed_zeros_survive() -> None:
@@ -437,6 +482,7 @@ def test_nan_payloads_and_signed_zeros_survive() -> None:
         raw[: where.offset] + struct.pack("<Q", int(own)) + raw[where.offset + 8 :]
         for raw, own in zip(messages, bits, strict=True)
     ]
-    block, begin = block_of(messages)
-    assert numbers(block, begin, where).view(np.uint64).tolist() == bits.tolist()
+    for compiled in (False, True):
+        taken = taken_of(layout, messages, [parse_path("/t:q[0]")], compiled=compiled)
+        assert taken.values[0].view(np.uint64).tolist() == bits.tolist()
     assert math.isnan(resolve(CDR(messages[0]), parse_path("/t:q[0]")))

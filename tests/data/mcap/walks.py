@@ -10,7 +10,7 @@ Message = tuple[int, int, bytes]  # channel, log time, the message's own bytes
 
 def walk(content: bytes) -> tuple[McapWalk, list[Message]]:
     """The walk, and its messages."""
-    found = McapWalk(np.frombuffer(content, np.uint8))
+    found = McapWalk(np.frombuffer(content, np.uint8), compiled=False)
     messages = [
         (int(c), int(t), block.data[int(b) : int(b + n)].tobytes())
         for block in found.blocks()
