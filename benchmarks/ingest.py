@@ -30,7 +30,7 @@ from mcap.writer import CompressionType, Writer
 from mcap_ros2.decoder import DecoderFactory
 
 from benchmarks.rows import Row, against, figure, in_turns, show
-from data.ingest import read_bytes
+from data.files import read_bytes
 from data.mcap import protobuf
 from data.mcap.columns import McapColumns, read_columns
 from data.mcap.field_path import parse_path

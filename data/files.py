@@ -7,12 +7,19 @@ goes and whatever stood under the final name before still stands.
 
 from __future__ import annotations
 
+import mmap
 import os
 import secrets
 from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO
 
+import numpy as np
+from numpy.typing import NDArray
+
+from data.findings import LogError
+
+ByteArray = NDArray[np.uint8]
 Writer = Callable[[BinaryIO], None]
 
 
@@ -42,3 +49,29 @@ def write_atomically(path: Path, content: bytes | str | Writer) -> None:
     except BaseException:
         partial.unlink(missing_ok=True)
         raise
+
+
+def read_bytes(path: Path, *, log: str) -> ByteArray:
+    """A file's bytes, mapped rather than read.
+
+    Raises
+    ------
+    LogError
+        When there is no such file, it is a folder, empty, or may not be read.
+    """
+    try:
+        if path.is_dir():
+            raise LogError(f"{log} is a folder, not a log file")
+        with path.open("rb") as stream:
+            if not path.is_file():
+                raise LogError(f"{log} is no regular file")
+            if path.stat().st_size == 0:
+                raise LogError(
+                    f"{log} is empty (0 bytes): nothing was recorded. Record it again or exclude it"
+                )
+            mapped = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+    except FileNotFoundError as error:
+        raise LogError(f"{log}: there is no such file") from error
+    except (OSError, ValueError) as error:
+        raise LogError(f"{log} cannot be read: {error}") from error
+    return np.frombuffer(mapped, np.uint8)

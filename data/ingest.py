@@ -8,7 +8,6 @@ comes out can be trusted or says why not; what cannot be used is one `LogError`.
 from __future__ import annotations
 
 import hashlib
-import mmap
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,8 +19,8 @@ from data.doors.csv import read_csv_log
 from data.doors.door import Door, Logged
 from data.doors.messages import read_bag_log, read_mcap_log
 from data.doors.tables import read_mat_log, read_parquet_log
+from data.files import ByteArray, read_bytes
 from data.findings import LogError
-from data.mcap.records import ByteArray
 from data.protocols import ProtocolName
 from data.recording import Axis, Recording
 from data.resolution import lattice_spacing
@@ -136,32 +135,6 @@ def screened_recording(
         findings=screened.findings,
         breaks=kept.breaks,
     )
-
-
-def read_bytes(path: Path, *, log: str) -> ByteArray:
-    """A file's bytes, mapped rather than read.
-
-    Raises
-    ------
-    LogError
-        When there is no such file, it is a folder, empty, or may not be read.
-    """
-    try:
-        if path.is_dir():
-            raise LogError(f"{log} is a folder, not a log file")
-        with path.open("rb") as stream:
-            if not path.is_file():
-                raise LogError(f"{log} is no regular file")
-            if path.stat().st_size == 0:
-                raise LogError(
-                    f"{log} is empty (0 bytes): nothing was recorded. Record it again or exclude it"
-                )
-            mapped = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
-    except FileNotFoundError as error:
-        raise LogError(f"{log}: there is no such file") from error
-    except (OSError, ValueError) as error:
-        raise LogError(f"{log} cannot be read: {error}") from error
-    return np.frombuffer(mapped, np.uint8)
 
 
 def _resolution(run: Run, *, axis: Axis, encoder_counts: float | None) -> float | None:

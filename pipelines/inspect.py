@@ -11,26 +11,23 @@ import math
 import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-from data.bag import description as bag_description
-from data.csv import description as csv_description
-from data.csv.description import CsvDescription
+from data.files import ByteArray, read_bytes
 from data.findings import LogError
-from data.ingest import read_bytes
 from data.integrity import Integrity
-from data.mat.log import MatLog
 from data.mcap import description as mcap_description
 from data.mcap.description import McapDescription
-from data.mcap.records import ByteArray
-from data.parquet.log import ParquetLog
 from data.signals import Format, log_format
 from data.tables import description as table_description
 from data.tables.description import TableDescription
 from pipelines.exit_status import Status
 
+if TYPE_CHECKING:
+    from data.csv.description import CsvDescription
+
 SCHEMA: Final = "stribeck/inspection/1"
-Description = McapDescription | CsvDescription | TableDescription
+Description: TypeAlias = "McapDescription | TableDescription | CsvDescription"
 
 
 @dataclass(frozen=True)
@@ -84,13 +81,24 @@ def inspect_log(path: Path) -> Inspection:
 
 
 def _described(path: Path, file_format: Format, content: ByteArray) -> Description:
-    if file_format == "bag":
-        return bag_description.describe(path)
+    """Describe a log; what only one format needs is loaded for it: a person waits for the answer."""
     if file_format == "mcap":
         return mcap_description.describe(content)
     if file_format == "csv":
+        from data.csv import description as csv_description  # noqa: PLC0415
+
         return csv_description.describe(content)
-    return table_description.describe((ParquetLog if file_format == "parquet" else MatLog)(content))
+    if file_format == "bag":
+        from data.bag import description as bag_description  # noqa: PLC0415
+
+        return bag_description.describe(path)
+    if file_format == "parquet":
+        from data.parquet.log import ParquetLog  # noqa: PLC0415
+
+        return table_description.describe(ParquetLog(content))
+    from data.mat.log import MatLog  # noqa: PLC0415
+
+    return table_description.describe(MatLog(content))
 
 
 def to_plain(inspection: Inspection) -> dict[str, Any]:
@@ -111,7 +119,7 @@ def to_plain(inspection: Inspection) -> dict[str, Any]:
     if isinstance(content, McapDescription):
         own = _mcap(content)
     else:
-        own = _columns(content) | (_dialect(content) if isinstance(content, CsvDescription) else {})
+        own = _columns(content) | ({} if isinstance(content, TableDescription) else _dialect(content))
     return {key: _finite(value) for key, value in (shared | own).items()}
 
 

@@ -203,8 +203,8 @@ def read_bomb(name: str) -> BombResult:
 
 def main(path: Path) -> None:
     """Describe the file and read it, and print the time [s] and the memory [bytes] that it took."""
+    from data.files import read_bytes  # noqa: PLC0415
     from data.findings import LogError  # noqa: PLC0415  # a light process
-    from data.ingest import read_bytes  # noqa: PLC0415
     from data.mcap.columns import read_columns  # noqa: PLC0415
     from data.mcap.description import describe  # noqa: PLC0415
     from data.mcap.field_path import parse_path  # noqa: PLC0415

@@ -30,9 +30,10 @@ Record = TypeVar("Record")
 HEADER: Final = struct.Struct("<BQ")
 MESSAGE_PREFIX: Final = 22  # channel, sequence, log time, publish time
 _PREFIX: Final = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log", "<i8"), ("publish", "<i8")])
-_ALIKE: Final = 16  # records of one header in a row, after which more are sought at once
+_ALIKE: Final = 16  # records of one opcode in a row, after which more are sought at once
 _FIRST_LOOK: Final = 64  # records
 _LONGEST_LOOK: Final = 1 << 16  # records
+_WINDOW: Final = 1 << 16  # [bytes]
 
 
 class Damage(Exception):  # noqa: N818  # what is found, not what went wrong in the program
@@ -133,39 +134,40 @@ def _scanned(block: ByteArray, begin: int, among: NDArray[np.bool_]) -> Tiling:
 
 
 def _stepped(block: ByteArray, begin: int, among: NDArray[np.bool_]) -> Tiling:
-    """Step from record to record; over records of one opcode and length, many at once."""
-    raw, last, allowed = block.data, block.size - HEADER.size, among.tolist()
-    opcodes, begins, lengths = bytearray(), array("q"), array("q")
-    here, alike, before = begin, 0, (-1, -1)
-    while here <= last and len(begins) < CHUNK_RECORDS:
-        opcode, length = own = HEADER.unpack_from(raw, here)
+    """Step from record to record; after some of one opcode in a row, over many at once."""
+    raw, last, allowed, unpack = block.data, block.size - HEADER.size, among.tolist(), HEADER.unpack_from
+    opcodes, lengths = bytearray(), array("q")
+    here, alike, before, patience = begin, 0, -1, _ALIKE
+    while here <= last and len(opcodes) < CHUNK_RECORDS:
+        opcode, length = unpack(raw, here)
         if not allowed[opcode] or length > last - here:
             break
-        stride = HEADER.size + length
-        alike, before = (alike + 1 if own == before else 0), own
-        count = 1 if alike < _ALIKE else _row(block, here, stride, CHUNK_RECORDS - len(begins))
-        if count == 1:
-            opcodes.append(opcode)
-            begins.append(here + HEADER.size)
-            lengths.append(length)
-        else:
-            alike = 0
-            opcodes += bytes((opcode,)) * count
-            begins.frombytes((here + HEADER.size + stride * np.arange(count, dtype=np.int64)).tobytes())
-            lengths.frombytes(np.full(count, length, np.int64).tobytes())
-        here += count * stride
-    return Tiling(
-        np.frombuffer(opcodes, np.uint8),
-        np.frombuffer(begins, np.int64),
-        np.frombuffer(lengths, np.int64),
-        here,
-    )
+        opcodes.append(opcode)
+        lengths.append(length)
+        here += HEADER.size + length
+        alike, before = (alike + 1 if opcode == before else 0), opcode
+        if alike >= patience:
+            more = _more(block, here, opcode, length, most=CHUNK_RECORDS - len(opcodes))
+            opcodes += bytes((opcode,)) * more.size
+            lengths.frombytes(more.tobytes())
+            here += int(more.sum()) + HEADER.size * more.size
+            alike, patience = (alike, _ALIKE) if more.size >= patience else (0, 2 * patience)
+    length_of = np.frombuffer(lengths, np.int64)
+    ends = begin + np.cumsum(length_of + HEADER.size)
+    return Tiling(np.frombuffer(opcodes, np.uint8), ends - length_of, length_of, here)
 
 
-def _row(block: ByteArray, here: int, stride: int, most: int) -> int:
-    """How many records from `here` on have the header of the one there, and fit."""
-    fit, found, step = min((block.size - here) // stride, most), 1, _FIRST_LOOK
-    header = block[here : here + HEADER.size]
+def _more(block: ByteArray, here: int, opcode: int, length: int, *, most: int) -> NDArray[np.int64]:
+    """The lengths of some records of one opcode from `here` on: of one length, or of any."""
+    alike = _alike(block, here, opcode, length, most=most)
+    return np.full(alike, length, np.int64) if alike else _chained(block, here, opcode)[:most]
+
+
+def _alike(block: ByteArray, here: int, opcode: int, length: int, *, most: int) -> int:
+    """How many records of one opcode and length there are from `here` on, which all fit."""
+    stride = HEADER.size + length
+    fit, found, step = min((block.size - here) // stride, most), 0, _FIRST_LOOK
+    header = np.frombuffer(HEADER.pack(opcode, length), np.uint8)
     while found < fit:
         step = min(step, fit - found)
         rows = np.ndarray((step, HEADER.size), np.uint8, block, here + found * stride, (stride, 1))
@@ -174,6 +176,19 @@ def _row(block: ByteArray, here: int, stride: int, most: int) -> int:
             return found + int(np.argmin(same))
         found, step = found + step, min(2 * step, _LONGEST_LOOK)
     return found
+
+
+def _chained(block: ByteArray, here: int, opcode: int) -> NDArray[np.int64]:
+    """The lengths of records from `here` on, each of which begins where the one before it ends, and fits."""
+    window = block[here : min(here + _WINDOW, block.size - HEADER.size + 1)]
+    start = here + np.flatnonzero(window == opcode)
+    length = np.ndarray((block.size - HEADER.size + 1,), "<u8", block, 1, (1,))[start]
+    fits = length <= (block.size - HEADER.size - start).astype(np.uint64)
+    start, length = start[fits], length[fits].astype(np.int64)
+    if not start.size or start[0] != here:
+        return length[:0]
+    linked = start[1:] == start[:-1] + HEADER.size + length[:-1]
+    return length if linked.all() else length[: int(np.argmin(linked)) + 1]
 
 
 def look(raw: memoryview, here: int, size: int) -> tuple[str, int, int]:

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from rich.console import Console, Group, RenderableType
 from rich.panel import Panel
@@ -19,7 +19,6 @@ from rich.table import Table
 from rich.text import Text
 
 from data.clocks import ClockReport
-from data.csv.description import Column, CsvDescription
 from data.findings import LogError
 from data.integrity import Integrity
 from data.mcap.description import ChannelDescription, Field, McapDescription
@@ -28,6 +27,9 @@ from data.signals import Format
 from data.tables.description import DescribedColumn, TableDescription
 from pipelines.exit_status import Status
 from pipelines.inspect import SCHEMA, Description, Inspection, frozen_dialect, inspect_log, to_plain
+
+if TYPE_CHECKING:
+    from data.csv.description import Column, CsvDescription
 
 MANY: Final = "stribeck/inspections/1"  # the schema of several inspections at once
 _EPOCH: Final = 1e8  # [s]; a start above this is a date
@@ -84,7 +86,7 @@ def print_inspection(inspection: Inspection, console: Console | None = None) -> 
     if inspection.simulated:
         title.append("  SIMULATED", style="bold magenta")
     console.print(Panel(Group(*parts), title=title, title_align="left", border_style="dim"))
-    if isinstance(content, CsvDescription):  # outside the frame and unwrapped, to be copied
+    if not isinstance(content, McapDescription | TableDescription):  # outside the frame, to be copied
         console.print(Text("to freeze how it is read, under [signals] in campaign.toml:", style="dim"))
         console.print(Text(frozen_dialect(content)), soft_wrap=True)
 
@@ -106,7 +108,7 @@ def _facts(inspection: Inspection) -> Table:
     else:
         kind = _KINDS[inspection.file_format]
         facts.add_row("file", Text(f"{kind} · {_size(inspection.size)} · {content.rows} rows"))
-        if isinstance(content, CsvDescription):
+        if not isinstance(content, TableDescription):
             facts.add_row("dialect", Text(shown(content.layout.described)))
         if content.clock is not None:
             facts.add_row("clock", _clock(content.clock, f"column {shown(content.clock_column or '', 40)}"))

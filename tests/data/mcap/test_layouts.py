@@ -419,13 +419,22 @@ def test_equal_keys_are_left_to_the_ordinary_decoder() -> None:
 
 # Records ----------------------------------------
 
+CONTENT = st.binary(max_size=9) | st.sampled_from([bytes(12), b"\5" + bytes(8), b"\5\1" + bytes(9)])
+RECORDS = st.tuples(
+    st.integers(0, 20) | st.just(5),
+    st.lists(CONTENT, min_size=1, max_size=4),
+    st.sampled_from([1, 1, 20, 90]),
+)
+
 
 @settings(max_examples=200, deadline=None)
-@given(st.lists(st.tuples(st.integers(0, 20), st.binary(max_size=9)), max_size=20), st.binary(max_size=12))
+@given(st.lists(RECORDS, max_size=20), st.binary(max_size=12), st.integers(0, 1000))
 def test_the_compiled_scan_finds_what_the_plain_one_finds(
-    records: list[tuple[int, bytes]], tail: bytes
+    runs: list[tuple[int, list[bytes], int]], tail: bytes, cut: int
 ) -> None:
-    raw = b"".join(hostile.record(opcode, content) for opcode, content in records) + tail
+    records = [hostile.record(opcode, own) for opcode, contents, n in runs for own in contents * n]
+    raw = b"".join(records) + tail
+    raw = raw[: len(raw) - cut] if cut < 20 else raw
     block = np.frombuffer(raw + b"\0", np.uint8)[:-1]
     among = np.ones(256, np.bool_)
     among[[0, 13]] = False
