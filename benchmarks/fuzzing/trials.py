@@ -23,7 +23,7 @@ from benchmarks.fuzzing.seeds import seeds
 HANG: Final = 10.0  # [s]
 MEMORY: Final = 512 << 20  # [bytes] resident
 _ADDRESSES: Final = 8 << 30  # [bytes] of address space, after which an allocation fails
-_EVERY: Final = 8  # mutants, of which one goes through the file door
+_EVERY: Final = 16  # mutants, of which one goes through the file door
 
 
 class HangError(BaseException):

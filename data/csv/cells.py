@@ -1,8 +1,8 @@
 """Cells of a row, and the numbers that they are.
 
 A cell is a number in the file's decimal sign, a word for a number that is missing, or text. Nothing else
-passes for a number: no `True`, no thousands separator, no hexadecimal, no date. A number beyond the largest
-double is refused too, or it would be read as infinite.
+passes for a number: no `True`, no thousands separator, no hexadecimal, no date (see `dates`). A number beyond
+the largest double is refused too, or it would be read as infinite.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from data.findings import LogError
 
 FloatArray = NDArray[np.float64]
 Decimal = Literal[".", ","]
+NO_NUMBER: Final = "no number"
 BLANKS: Final = " \t\x0b\x0c"
 _NUMBER: Final = {
     ".": r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(?i:nan|inf|infinity|1\.#inf)",
@@ -35,7 +36,7 @@ _IS_MISSING: Final = re.compile(
 class NotNumbersError(Exception):
     """A column holds a cell that is no number: which row, and the cell."""
 
-    def __init__(self, row: int, cell: str, why: str = "no number") -> None:
+    def __init__(self, row: int, cell: str, why: str = NO_NUMBER) -> None:
         super().__init__(row, cell, why)
         self.row = row
         self.cell = cell

@@ -23,7 +23,7 @@ from data.findings import LogError
 from data.names import shown
 
 FloatArray = NDArray[np.float64]
-_PLAIN: Final = (*TIME_NAMES, "x_value", "zeit")  # LabVIEW's, and in German
+_PLAIN: Final = (*TIME_NAMES, "datetime", "x_value", "zeit")  # pandas', LabVIEW's, and in German
 
 
 def time_columns(layout: CsvLayout) -> tuple[int, ...]:

@@ -59,7 +59,7 @@ def describe(content: bytes | ByteArray) -> CsvDescription:
     times = time_columns(layout)
     table = read_csv(content, layout, range(layout.columns), clocks=times, strict=False)
     columns = tuple(
-        _column(k, layout, table.values.get(k), table.reasons.get(k)) for k in range(layout.columns)
+        _column(k, table, table.values.get(k), table.reasons.get(k)) for k in range(layout.columns)
     )
     clock, clock_column = _clock(table, times)
     integrity = table_integrity(table)
@@ -77,11 +77,15 @@ def describe(content: bytes | ByteArray) -> CsvDescription:
     )
 
 
-def _column(k: int, layout: CsvLayout, values: NDArray[np.float64] | None, why: str | None) -> Column:
-    header = layout.headers[k] if layout.headers else ""
+def _column(k: int, table: CsvTable, values: NDArray[np.float64] | None, why: str | None) -> Column:
+    header = table.layout.headers[k] if table.layout.headers else ""
     if values is None:
-        return Column(k, header, layout.units[k], None, None, 0, why)
-    return Column(k, header, layout.units[k], *value_range(values))
+        return Column(k, header, table.layout.units[k], None, None, 0, why)
+    return Column(k, header, _unit(table, k), *value_range(values))
+
+
+def _unit(table: CsvTable, k: int) -> str | None:
+    return "s" if k in table.dated else table.layout.units[k]
 
 
 def _clock(table: CsvTable, times: Sequence[int]) -> tuple[ClockReport | None, str | None]:
@@ -91,7 +95,7 @@ def _clock(table: CsvTable, times: Sequence[int]) -> tuple[ClockReport | None, s
             continue
         if not np.all(np.abs(table.values[k][np.isfinite(table.values[k])]) < _NO_TIME):
             continue
-        unit = known_unit(table.layout.units[k] or "s")
+        unit = known_unit(_unit(table, k) or "s")
         factor = unit.factor if unit and unit.kind == "time" else 1.0
         stamps = table.values[k] * factor
         seconds = elapsed(table, k) * factor

@@ -21,7 +21,8 @@ import pyarrow.csv as arrow_csv
 from numpy.typing import NDArray
 
 from data.columns import called, require_one_length
-from data.csv.cells import NotNumbersError, numbers
+from data.csv.cells import NO_NUMBER, NotNumbersError, numbers
+from data.csv.dates import are_dates, no_number, seconds_written
 from data.csv.layout import CsvLayout
 from data.csv.rows import Block, Rows, Tally, whole_rows
 from data.csv.text import ByteArray, open_text
@@ -74,6 +75,7 @@ class CsvTable:
     rows: Rows  # what was kept of the file, and what was taken out
     written: dict[int, pa.ChunkedArray]  # cells (n,) as text, of the columns whose text was asked for
     reasons: dict[int, str]  # by column number: why it is no column of numbers
+    dated: frozenset[int] = frozenset()  # columns of dates or times of day, which were made seconds
 
 
 def read_csv(
@@ -106,12 +108,15 @@ def read_csv(
     parts: dict[int, list[FloatArray]] = {k: [] for k in columns}
     texts: dict[int, list[pa.Array]] = {k: [] for k in columns if k in stamps}
     reasons: dict[int, str] = {}
+    dated: dict[int, bool] = {}  # by column of times, as its first block has it
     found = Tally()
     for block in whole_rows(open_text(content, layout.encoding), layout, found):
         if not block.rows:
             continue
-        for k, cells in _columns(block, layout, list(parts)).items():
+        for k, found_cells in _columns(block, layout, list(parts)).items():
             try:
+                is_dated = k in texts and dated.setdefault(k, are_dates(found_cells))
+                cells = seconds_written(found_cells, layout.decimal) if is_dated else found_cells
                 parts[k].append(numbers(cells, layout.decimal))
             except NotNumbersError as error:
                 reasons[k] = _no_number(layout, k, found.kept - block.rows + error.row, error)
@@ -128,6 +133,7 @@ def read_csv(
         rows=found.rows,
         written={k: pa.chunked_array(pieces, pa.string()) for k, pieces in texts.items()},
         reasons=reasons,
+        dated=frozenset(k for k, own in dated.items() if own),
     )
 
 
@@ -169,7 +175,8 @@ def _columns(block: Block, layout: CsvLayout, columns: Sequence[int]) -> dict[in
 def _no_number(layout: CsvLayout, column: int, row: int, error: NotNumbersError) -> str:
     name = layout.headers[column] if layout.headers else str(column)
     cell = shown(error.cell, 40)
-    return f"column {shown(name)!r} holds {cell!r} in row {row + 1} of the numbers: {error.why}"
+    why = (error.why if error.why != NO_NUMBER else None) or no_number(error.cell)
+    return f"column {shown(name)!r} holds {cell!r} in row {row + 1} of the numbers: {why}"
 
 
 def table_integrity(table: CsvTable) -> Integrity:

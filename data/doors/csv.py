@@ -14,6 +14,7 @@ from data.findings import Finding, LogError, Severity
 from data.mcap.records import ByteArray
 from data.names import shown
 from data.signals import Signal
+from data.units import same_unit
 
 
 def read_csv_log(door: Door, content: ByteArray) -> Logged:
@@ -34,6 +35,7 @@ def read_csv_log(door: Door, content: ByteArray) -> Logged:
             require_unit("time", time, layout.units[clock], axis=door.axis)
         stamped = {column, *clocks.values()}
         table = read_csv(content, layout, {*columns.values(), *stamped}, clocks=stamped)
+        _require_seconds(time, table.dated)
         findings = table_integrity(table).require(door.log, salvage=door.salvage)
         one = float(door.convert("time", interval(time), np.ones(1))[0])
         read = on_clock(table, columns, clocks, seconds=one)
@@ -61,3 +63,12 @@ def read_csv_log(door: Door, content: ByteArray) -> Logged:
         breaks=tuple(place - lead for place in table.rows.breaks if lead < place < read.rows),
     )
     return after_first(logged) if held else logged
+
+
+def _require_seconds(time: Signal, dated: frozenset[int]) -> None:
+    """Refuse another unit for times that are dates."""
+    if dated and (time.scale is not None or not same_unit(time.unit or "s", "s")):
+        raise LogError(
+            f"column {min(dated)} holds dates or times of day, which are read as seconds; take the unit and "
+            "the scale of the time out of [signals], and out of the column's header"
+        )
