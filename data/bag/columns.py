@@ -11,7 +11,7 @@ import numpy as np
 
 from data.bag.reader import Bag, opened
 from data.integrity import Integrity
-from data.mcap.columns import McapColumns, Topic, joined
+from data.mcap.columns import McapColumns, Topic, called, joined
 from data.mcap.field_path import FieldPath, resolve, resolve_exactly
 from data.mcap.stamp import NO_STAMP, header_stamp
 
@@ -52,27 +52,28 @@ def read_columns(path: Path, wanted: Sequence[FieldPath], *, clock: FieldPath | 
     with opened(path) as bag:
         gathered = _gathered(bag, paths, clock)
         declared = [connection.topic for connection in bag.connections]
-    parts: dict[str, list[Topic]] = {topic: [] for topic in paths}
-    for topic, own in gathered:
-        if own.log:
-            parts[topic].append(own.topic(paths[topic]))
-    topics = {topic: joined(topic, own, declared) for topic, own in parts.items()}
-    count = sum(len(own.log) for _, own in gathered)
+    topics = {
+        topic: joined(topic, {number: own.topic(paths[topic]) for number, own in mine.items()}, declared)
+        for topic, mine in gathered.items()
+    }
+    count = sum(len(own.log) for mine in gathered.values() for own in mine.values())
     return McapColumns(topics, {}, Integrity("absent", messages=count), decoded_singly=count)
 
 
 def _gathered(
     bag: Bag, paths: dict[str, list[FieldPath]], clock: FieldPath | None
-) -> list[tuple[str, _Gathered]]:
-    """The messages of each connection of a wanted topic."""
-    mine = [connection for connection in bag.connections if connection.topic in paths]
-    gathered = {connection.id: _Gathered() for connection in mine}
+) -> dict[str, dict[int, _Gathered]]:
+    """The messages of each wanted topic, by the connection that they came on."""
+    topics = {own.id: called(own.topic, own.id, paths) for own in bag.connections}
+    mine = [connection for connection in bag.connections if topics[connection.id]]
+    gathered: dict[str, dict[int, _Gathered]] = {topic: {} for topic in paths}
     for connection, log_time, raw in bag.messages(mine) if mine else ():
         message = bag.decode(bytes(raw), connection.msgtype)
-        found, own = gathered[connection.id], paths[connection.topic]
-        found.values.append([resolve(message, one) for one in own])
-        found.log.append(log_time)
-        found.header.append(header_stamp(message))
-        if clock in own and clock is not None:
-            found.ticks.append(resolve_exactly(message, clock))
-    return [(connection.topic, gathered[connection.id]) for connection in mine]
+        for topic in topics[connection.id]:
+            found, own = gathered[topic].setdefault(connection.id, _Gathered()), paths[topic]
+            found.values.append([resolve(message, one) for one in own])
+            found.log.append(log_time)
+            found.header.append(header_stamp(message))
+            if clock in own and clock is not None:
+                found.ticks.append(resolve_exactly(message, clock))
+    return gathered

@@ -50,6 +50,7 @@ def _channel(bag: Bag, connection: Any, first: bytes, stamps: list[int]) -> Chan
     except Exception as error:  # a foreign decoder on foreign bytes may raise anything
         refused = str(error) if isinstance(error, LogError) else f"it cannot be decoded ({error})"
     return ChannelDescription(
+        number=connection.id,
         topic=connection.topic,
         encoding="ros1" if bag.profile == "ros1" else "cdr",
         schema=connection.msgtype,

@@ -10,7 +10,7 @@ stamp in the message's own header where it has one.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from itertools import pairwise
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 TimeArray = NDArray[np.int64]
+_MOST_NAMED: Final = 4  # channels
 _LARGE: Final = 4 << 20  # [bytes] of a file that is worth loading compiled code
 
 
@@ -84,25 +85,30 @@ def read_columns(
     paths: dict[str, list[FieldPath]] = {}
     for path in wanted:
         paths.setdefault(path.topic, []).append(path)
-    readers: dict[int, _ChannelReader] = {}
+    readers: dict[str, dict[int, _ChannelReader]] = {topic: {} for topic in paths}
     for block in walk.blocks():
         for number in np.flatnonzero(np.bincount(block.messages.channel)).tolist():
             channel = walk.channels[number]
-            if channel.topic in paths:
-                if number not in readers:
-                    readers[number] = _reader(walk, channel, paths[channel.topic], clock)
-                readers[number].take(block, number)
+            for topic in called(channel.topic, number, paths):
+                mine = readers[topic]
+                if number not in mine:
+                    mine[number] = _reader(walk, channel, paths[topic], clock)
+                mine[number].take(block, number)
     declared = [channel.topic for channel in walk.channels.values()]
-    parts: dict[str, list[Topic]] = {topic: [] for topic in paths}
-    for number, reader in readers.items():
-        parts[walk.channels[number].topic].append(reader.topic())
-    topics = {topic: joined(topic, own, declared) for topic, own in parts.items()}
     return McapColumns(
-        topics=topics,
+        topics={
+            topic: joined(topic, {number: reader.topic() for number, reader in mine.items()}, declared)
+            for topic, mine in readers.items()
+        },
         metadata=run_metadata(walk),
         integrity=walk.integrity,
-        decoded_singly=sum(reader.singly for reader in readers.values()),
+        decoded_singly=sum(reader.singly for mine in readers.values() for reader in mine.values()),
     )
+
+
+def called(topic: str, number: int, wanted: Collection[str]) -> list[str]:
+    """Which of the wanted topics a channel is read as: its own, `/state`, or with its number, `/state#3`."""
+    return [name for name in (topic, f"{topic}#{number}") if name in wanted]
 
 
 def survey(content: ByteArray) -> Integrity:
@@ -139,24 +145,26 @@ def _reader(
     return _ChannelReader(paths, decode, recognise and LayoutReader(paths, recognise, compiled=walk.compiled))
 
 
-def joined(topic: str, parts: Sequence[Topic], declared: Sequence[str]) -> Topic:
-    """A topic's columns, from its one channel or from several that took turns.
+def joined(topic: str, channels: Mapping[int, Topic], declared: Sequence[str]) -> Topic:
+    """A topic's columns, from its one channel or from several that took turns, by number.
 
     Raises
     ------
     LogError
         When no channel had a message of it (`declared` are the log's topics), or two had at the same time.
     """
-    if not parts:
+    if not channels:
         if topic in declared:
             raise LogError(f"topic {shown(topic)!r} is declared but holds no message")
         raise LogError(f"no topic {shown(topic)!r}; the log has {nearest(topic, declared)}")
-    parts = sorted(parts, key=lambda part: int(part.log_time[0]))
+    parts = sorted(channels.values(), key=lambda part: int(part.log_time[0]))
     for before, after in pairwise(parts):
         if before.log_time.max() >= after.log_time.min():
+            numbers = sorted(channels)[:_MOST_NAMED]
+            names = " or ".join(repr(shown(f"{topic}#{number}")) for number in numbers)
             raise LogError(
                 f"topic {shown(topic)!r} is on {len(parts)} channels at the same time: two publishers, and "
-                "no way to tell which is the rig's. Keep one of them in the log"
+                f"no way to tell which is the rig's. Name one by its number: {names}"
             )
     if len(parts) == 1:
         return parts[0]

@@ -46,6 +46,7 @@ class Field:
 class ChannelDescription:
     """One channel."""
 
+    number: int  # as the file counts channels
     topic: str
     encoding: str
     schema: str  # name, empty for none
@@ -148,6 +149,7 @@ def _channel(part: _Seen) -> ChannelDescription:
     except LogError as error:
         refused = str(error)
     return ChannelDescription(
+        number=part.channel.id,
         topic=part.channel.topic,
         encoding=part.channel.message_encoding,
         schema=part.schema.name if part.schema else "",

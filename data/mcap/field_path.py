@@ -4,6 +4,7 @@
 /joint_states:position{link}       the element whose place in `name` is that of "link"
 /rig/state:motor.current           a field of a field
 /command:position                  a number, or an array that has exactly one element
+/joint_states#3:position[0]        of the topic's channel 3, where two publish it at once
 """
 
 from __future__ import annotations

@@ -76,7 +76,11 @@ def print_inspection(inspection: Inspection, console: Console | None = None) -> 
     content = inspection.content
     parts: list[RenderableType] = [_facts(inspection)]
     if isinstance(content, McapDescription):
-        parts += [_channel(channel) for channel in content.channels[:_MOST_ROWS]]
+        topics = [channel.topic for channel in content.channels]
+        parts += [
+            _channel(channel, alone=topics.count(channel.topic) == 1)
+            for channel in content.channels[:_MOST_ROWS]
+        ]
         parts += _more(content)
     else:
         parts.append(_columns(content))
@@ -142,9 +146,11 @@ def _integrity(found: Integrity) -> Text:
     return text
 
 
-def _channel(channel: ChannelDescription) -> Group:
+def _channel(channel: ChannelDescription, *, alone: bool) -> Group:
+    """A channel; where it is not `alone` on its topic, by the name that tells it from the others."""
+    topic = channel.topic if alone else f"{channel.topic}#{channel.number}"
     head = Text("\n")
-    head.append(shown(channel.topic), style="bold cyan")
+    head.append(shown(topic), style="bold cyan")
     kind = shown(channel.schema, 60) or "no schema"
     head.append(
         f"  {kind} · {shown(channel.encoding, 20)} · {channel.log_clock.samples} messages", style="dim"
@@ -156,11 +162,11 @@ def _channel(channel: ChannelDescription) -> Group:
     if channel.refused:
         rows.append(Text(shown(channel.refused, 300), style="yellow"))
     else:
-        rows.append(_field_table(channel))
+        rows.append(_field_table(channel, topic))
     return Group(*rows)
 
 
-def _field_table(channel: ChannelDescription) -> Table:
+def _field_table(channel: ChannelDescription, topic: str) -> Table:
     table = Table(box=None, pad_edge=False, header_style="dim")
     table.add_column("field path", no_wrap=True, overflow="ellipsis")
     table.add_column("first value", justify="right")
@@ -168,9 +174,7 @@ def _field_table(channel: ChannelDescription) -> Table:
     telling = [item for item in channel.fields if not _said_elsewhere(item, channel)]
     for item in telling[:_MOST_ROWS]:
         value = "" if item.value is None else _value(item)
-        table.add_row(
-            Text(f"{shown(channel.topic, 60)}:{shown(item.path, 60)}"), Text(value), Text(_elements(item))
-        )
+        table.add_row(Text(f"{shown(topic, 60)}:{shown(item.path, 60)}"), Text(value), Text(_elements(item)))
     return table
 
 

@@ -13,6 +13,7 @@ from mcap_ros2._dynamic import generate_dynamic, serialize_dynamic
 from data.findings import LogError
 from data.mcap import joint_state
 from data.mcap.columns import read_columns
+from data.mcap.description import describe
 from data.mcap.field_path import parse_path
 from data.mcap.writer import METADATA_NAME
 from tests.data import hostile
@@ -185,8 +186,30 @@ def test_two_publishers_at_once_are_refused_and_in_turn_are_joined() -> None:
     mixed = [hostile.message(1 + k % 2, k, body) for k, body in enumerate(bodies)]
     read = read_columns(np.frombuffer(hostile.file(heads, *turns), np.uint8), [parse_path("/a:x")])
     assert read.topics["/a"].values["/a:x"].tolist() == [0, 1, 2, 3]
-    with pytest.raises(LogError, match="two publishers"):
-        read_columns(np.frombuffer(hostile.file(heads, *mixed), np.uint8), [parse_path("/a:x")])
+    both = np.frombuffer(hostile.file(heads, *mixed), np.uint8)
+    with pytest.raises(LogError, match=r"two publishers, .* by its number: '/a#1' or '/a#2'"):
+        read_columns(both, [parse_path("/a:x")])
+    for number, values in ((1, [0, 2]), (2, [1, 3])):
+        path = parse_path(f"/a#{number}:x")
+        assert read_columns(both, [path]).topics[path.topic].values[path.text].tolist() == values
+    with pytest.raises(LogError, match="no topic '/a#3'; the log has /a"):
+        read_columns(both, [parse_path("/a#3:x")])
+
+
+def test_a_publisher_that_cannot_be_decoded_harms_no_other() -> None:
+    heads = hostile.channel(1, 0, "/a", "json") + hostile.channel(2, 0, "/a", "cbor")
+    content = hostile.file(heads, hostile.message(1, 1, b'{"x": 5}'), hostile.message(2, 1, b"??"))
+    data = np.frombuffer(content, np.uint8)
+    with pytest.raises(LogError, match="encoded as 'cbor'"):
+        read_columns(data, [parse_path("/a:x")])
+    assert read_columns(data, [parse_path("/a#1:x")]).topics["/a#1"].values["/a#1:x"].tolist() == [5]
+    assert [channel.number for channel in describe(data).channels] == [1, 2]
+
+
+def test_a_topic_that_is_called_with_a_number_is_itself() -> None:
+    content = hostile.file(hostile.channel(1, 0, "/a#2", "json"), hostile.message(1, 1, b'{"x": 5}'))
+    read = read_columns(np.frombuffer(content, np.uint8), [parse_path("/a#2:x")])
+    assert read.topics["/a#2"].values["/a#2:x"].tolist() == [5]
 
 
 @pytest.mark.parametrize("text", ["", "/a", "/a:", ":x", "/a:x[", "/a:x[-1]", "/a:x..y", "/a:x.", "/a:[0]"])
