@@ -2,6 +2,8 @@
 
 import json
 import struct
+import subprocess
+import sys
 import tomllib
 import tracemalloc
 from io import StringIO
@@ -23,6 +25,24 @@ from pipelines.inspect import SCHEMA, inspect_log, to_plain
 from pipelines.settings.campaign import load_campaign
 from pipelines.terminal.inspection import inspect_logs, print_inspection
 from tests.data import hostile
+
+TOLD = """
+import sys
+from pathlib import Path
+from pipelines.terminal.inspection import inspect_logs
+inspect_logs([Path(sys.argv[1])])
+print([name for name in ("numba", "pyarrow", "scipy", "pandas", "google.protobuf") if name in sys.modules])
+"""
+
+
+def test_an_mcap_log_is_told_without_what_it_does_not_need(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    time = np.arange(60_000, dtype=np.float64) * 1e-3
+    write_mcap(path, time=time, position=np.sin(time), effort=time, encoding="json", compression="none")
+    assert path.stat().st_size > 8 << 20  # what a reader would load compiled code for
+    run = subprocess.run([sys.executable, "-c", TOLD, str(path)], capture_output=True, text=True, check=True)
+    assert "60000 messages" in run.stdout
+    assert run.stdout.splitlines()[-1] == "[]"
 
 
 def drawn(path: Path) -> str:
