@@ -14,14 +14,13 @@ Source: https://mcap.dev/spec (version 0).
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from mcap.opcode import Opcode
-from mcap.records import Channel, Footer, Header, Metadata, Schema, Statistics
+from mcap.records import Channel, Header, Metadata, Schema, Statistics
 
 from data.integrity import Integrity, Loss
 from data.mcap.ahead import Unpacking
@@ -30,6 +29,7 @@ from data.mcap.chunks import extent, read_head
 from data.mcap.container import MAGIC
 from data.mcap.credible import Surroundings, follows, message_begins, surroundings
 from data.mcap.declarations import Declarations
+from data.mcap.endings import Endings
 from data.mcap.fields import Fields, read_metadata
 from data.mcap.limits import (
     METADATA_BYTES,
@@ -39,7 +39,7 @@ from data.mcap.limits import (
 )
 from data.mcap.proofs import Proofs
 from data.mcap.readable import BLOCK_OPCODES, Dropped, readable, refused
-from data.mcap.records import HEADER, MESSAGE_PREFIX, ByteArray, Damage, Messages, Tiling, look, parse, tile
+from data.mcap.records import HEADER, MESSAGE_PREFIX, ByteArray, Damage, Messages, Tiling, look, tile
 from data.mcap.resync import Seeker, disguised, exact, summary_declarations
 
 _HINTS: Final = (
@@ -51,7 +51,6 @@ _HINTS: Final = (
 )
 _PASSED: Final = frozenset({*map(int, _HINTS), *range(16, 256)})  # not needed here, or not known
 _AHEAD: Final = 4 << 20  # [bytes] of a file that is worth a thread
-_LONGEST_STATISTICS: Final = 46 + 10 * (1 << 16)  # [bytes]
 _SMALLEST_DISGUISED: Final = MESSAGE_PREFIX  # [bytes]
 _MOST_DISGUISED: Final = 10_000  # of a stretch that are looked through
 
@@ -78,20 +77,18 @@ class McapWalk:
         self.attachments: list[AttachmentLabel] = []
         self.header = Header(profile="", library="")
         self.compressions: dict[str, int] = {}  # chunks by compression, "none" included
-        self.indexed = False  # whether a summary stands at the end
         self.compiled = compiled
         self._content = content
         self._declared = Declarations()
         self._seeker = Seeker(content)
         self._proofs = Proofs()
-        self._statistics: bytes | None = None
+        self._endings = Endings(content, self._proofs)
         self._unpacking = Unpacking(content, ahead=False)
         self._entries = 0  # of metadata
         self._metadata_bytes = 0
         self._loose = False  # whether messages stand outside chunks
         self._chunked = False  # whether there are chunks
         self._summary_read = False
-        self._data_ended = False
         self._suspect = -1  # the record that ends where no other follows
 
     @property
@@ -107,9 +104,12 @@ class McapWalk:
     @property
     def statistics(self) -> Statistics | None:
         """What the file says of itself, if it does."""
-        return (
-            parse(Statistics.read, self._statistics, where=0, name="statistics") if self._statistics else None
-        )
+        return self._endings.statistics
+
+    @property
+    def indexed(self) -> bool:
+        """Whether a summary stands at the end."""
+        return self._endings.indexed
 
     @property
     def integrity(self) -> Integrity:
@@ -137,7 +137,7 @@ class McapWalk:
                 yield block
         if not ended and not self._proofs.lost_to(size):
             self._proofs.lose(size, size, "it stops there: the recording was cut off")
-        self._compare_statistics()
+        self._endings.compare()
 
     def _begin(self) -> int:
         """Where the first record stands."""
@@ -172,7 +172,7 @@ class McapWalk:
         if opcode in _PASSED:
             return None, self._pass_over(here), False
         if opcode == Opcode.FOOTER:
-            self._footer(begin, end)
+            self._endings.footer(begin, end)
             return None, end, True
         try:
             self._record(opcode, begin, end)
@@ -305,12 +305,9 @@ class McapWalk:
             if begin != len(MAGIC) + HEADER.size:
                 raise Damage(begin, "a header record that is not the first")
         elif opcode == Opcode.STATISTICS:
-            if content.size > _LONGEST_STATISTICS:
-                raise Damage(begin, f"statistics of {content.size} bytes")
-            self._statistics = content.tobytes()
-            self._proofs.promised = Fields(content.data, where=begin, record=name).number(8)
+            self._endings.take_statistics(begin, end)
         elif opcode == Opcode.DATA_END:
-            self._end_data(int.from_bytes(content[:4].tobytes(), "little"), begin)
+            self._endings.end_data(begin)
         elif opcode == Opcode.ATTACHMENT:
             if len(self.attachments) >= MOST_ATTACHMENTS:
                 raise Damage(begin, f"more than {MOST_ATTACHMENTS} attachments")
@@ -328,57 +325,6 @@ class McapWalk:
             raise Damage(begin, "a metadata record whose lengths do not add up")
         self._entries += 1 + len(found.metadata)
         self.metadata.append(found)
-
-    def _end_data(self, checksum: int, begin: int) -> None:
-        """Check the checksum of all that came before, where there is one."""
-        self._data_ended = True
-        if checksum and self._proofs.whole:
-            before = begin - HEADER.size
-            if zlib.crc32(self._content[:before].data) == checksum:
-                self._proofs.prove_all()
-            else:
-                why = (
-                    "the data section's checksum differs from its content: something before it was changed, "
-                    "and only what has a checksum of its own is proved"
-                )
-                self._proofs.lose(before, begin + 4, why, gap=False)
-
-    def _footer(self, begin: int, end: int) -> None:
-        """Check the summary's checksum and the magic number behind it."""
-        size = self._content.size
-        footer = parse(Footer.read, self._content[begin:end].tobytes(), where=begin, name="footer")
-        self.indexed = footer.summary_start != 0
-        if not self._data_ended and self._proofs.whole:
-            why = "the end of the data section is not marked; all that stands before it was read"
-            self._proofs.lose(begin - HEADER.size, begin - HEADER.size, why, gap=False)
-        start = footer.summary_start or begin - HEADER.size
-        if footer.summary_crc and (
-            start > begin or zlib.crc32(self._content[start : begin + 16].data) != footer.summary_crc
-        ):
-            why = "the summary's checksum differs from its content"
-            self._proofs.lose(min(start, begin), end, why, gap=False)
-        if self._content[end : end + len(MAGIC)].tobytes() != MAGIC:
-            self._proofs.lose(end, size, "it does not end as an MCAP file does", gap=False)
-        elif size > end + len(MAGIC):
-            self._proofs.notes.append(self._behind(end + len(MAGIC)))
-
-    def _behind(self, end: int) -> str:
-        """What is to be said of bytes behind the end."""
-        rest = self._content[end:]
-        if rest[: len(MAGIC)].tobytes() == MAGIC:
-            return (
-                f"another MCAP file of {rest.size} bytes stands behind the end of the first and is not read; "
-                "split them, or merge them into one"
-            )
-        return f"{rest.size} bytes stand behind the end and are not read"
-
-    def _compare_statistics(self) -> None:
-        """Hold the messages that were found against those that the file promises."""
-        promised, found = self._proofs.promised, self._proofs.messages
-        if promised is not None and promised != found and self._proofs.whole:
-            end = self._content.size
-            why = f"the statistics promise {promised} messages, {found} were found"
-            self._proofs.lose(end, end, f"{why}; where the others belong is not told", gap=False)
 
     def _if_followed(self, end: int) -> int | None:
         """Where a record ends, if another follows there."""
