@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Final
 
 import lz4.frame
+import numpy as np
 import zstandard
 
 from benchmarks.fuzzing.memory import peak_memory
@@ -134,6 +135,9 @@ BOMBS: Final[dict[str, Callable[[], bytes]]] = {
     "zstd that says 2 GiB": lambda: file(zstd(_MILLIONS, size=2 << 30)),
     "zstd that says 1 byte": lambda: file(zstd(_MILLIONS, size=1)),
     "zstd of zeros, a hundred chunks": lambda: file(zstd(_MILLIONS, copies=100)),
+    "zeros behind noise": lambda: file(
+        record(9, np.random.default_rng(1).bytes(6 << 20)), zstd(_MILLIONS, copies=10)
+    ),
     "zstd with a window of 1 GiB": lambda: file(chunk(_window(), name="zstd", size=1000)),
     "lz4 that says 2 GiB": lambda: file(chunk(lz4.frame.compress(_MILLIONS), name="lz4", size=2 << 30)),
     "lz4 that says 1 byte": lambda: file(chunk(lz4.frame.compress(_MILLIONS), name="lz4", size=1)),

@@ -17,6 +17,7 @@ from data.mcap.chunks import ChunkHead, extent, unpack
 from data.mcap.records import HEADER, ByteArray, look
 
 _MOST_BETWEEN: Final = 64  # records between two chunks, before the next is not sought
+_LARGEST: Final = 16 << 20  # [bytes] of a chunk that is kept beside the one that is read
 
 
 class Unpacking:
@@ -50,7 +51,7 @@ class Unpacking:
 
     def _begin_next(self, here: int) -> None:
         following = self._following(here) if self._thread is not None else None
-        if self._thread is not None and following is not None:
+        if self._thread is not None and following is not None and following.unpacked_size <= _LARGEST:
             begun = self._thread.submit(unpack, self._content, following, unpacked_before=self._unpacked)
             self._next = (following, begun)
 
