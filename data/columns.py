@@ -15,6 +15,8 @@ from data.units import known_unit
 
 FloatArray = NDArray[np.float64]
 TIME_NAMES: Final = ("t", "time", "__time", "timestamp")  # plainly the time; formats have names of their own
+NO_UNIT: Final = ("", "-", "1", "(none)", "none", "n/a")
+_UNIT_SIGNS: Final = re.compile(r"[/·⋅*^°%²³⁻]")
 _BRACKETED: Final = re.compile(r"^(.*?)\s*(?:\[([^\]]*)\]|\(([^)]*)\))$")
 _SUFFIXED: Final = re.compile(r"^.+_(deg|rad|mrad|rpm)$")  # the only endings that cannot mean anything else
 
@@ -26,13 +28,27 @@ def bare(header: str) -> str:
 
 
 def declared_unit(header: str) -> str | None:
-    """The unit that a header declares, in brackets or by an ending that can mean nothing else; None: none."""
+    """The unit that a header declares, in brackets or by an ending that can mean nothing else; None: none.
+
+    It may be one that is not known here. `q[0]` and `q (filtered)` declare none.
+    """
     found = _BRACKETED.match(header.strip())
-    word = (found[2] or found[3] or "") if found else ""
-    if not word:
+    if found is None:
         ending = _SUFFIXED.match(header.strip())
-        word = ending[1] if ending else ""
-    return word.strip() if word and known_unit(word) else None
+        return ending[1] if ending else None
+    word = (found[2] or found[3] or "").strip()
+    if known_unit(word):
+        return word
+    if not found[1] or word.lower() in NO_UNIT or word.isdecimal():
+        return None
+    unlike = found[2] is None and not known_unit(word.lower()) and not _UNIT_SIGNS.search(word)
+    return None if unlike else word
+
+
+def is_time(header: str, names: Sequence[str] = TIME_NAMES) -> bool:
+    """Whether a column is plainly the time by its name; `T` is a temperature, a torque or a period."""
+    plain = bare(header)
+    return plain != "T" and plain.lower() in names
 
 
 def called(names: Sequence[str], wanted: str) -> list[int]:

@@ -47,6 +47,8 @@ class Unit:
 
 _TURN: Final = 2.0 * math.pi
 _DEGREE: Final = math.pi / 180.0
+_KILOPOND: Final = 9.80665  # [N] of 1 kg, exact
+_POUND: Final = 0.45359237 * _KILOPOND  # [N] of 1 lb, exact
 _TABLE: Final[tuple[tuple[Kind, float, tuple[str, ...]], ...]] = (
     ("time", 1.0, ("s", "sec", "second", "seconds")),
     ("time", 1e-3, ("ms", "msec", "millisecond", "milliseconds")),
@@ -54,15 +56,23 @@ _TABLE: Final[tuple[tuple[Kind, float, tuple[str, ...]], ...]] = (
     ("time", 1e-9, ("ns", "nsec", "nanosecond", "nanoseconds")),
     ("time", 1e-7, ("100 ns", "100ns", "FILETIME", "filetime")),
     ("time", 60.0, ("min", "minute", "minutes")),
+    ("time", 3600.0, ("h", "hr", "hour", "hours")),
+    ("time", 86400.0, ("day", "days")),
     ("angle", 1.0, ("rad", "radian", "radians")),
     ("angle", 1e-3, ("mrad", "milliradian", "milliradians")),
+    ("angle", 1e-6, ("urad", "microradian", "microradians")),
     ("angle", _DEGREE, ("deg", "degree", "degrees")),
+    ("angle", 1e-3 * _DEGREE, ("mdeg", "millidegree", "millidegrees")),
+    ("angle", _DEGREE / 60.0, ("arcmin", "arcminute", "arcminutes")),
+    ("angle", _DEGREE / 3600.0, ("arcsec", "arcsecond", "arcseconds")),
+    ("angle", math.pi / 200.0, ("gon", "gons", "gradian", "gradians")),
     ("angle", _TURN, ("rev", "revolution", "revolutions", "turn", "turns")),
     ("length", 1.0, ("m", "metre", "metres", "meter", "meters")),
     ("length", 1e-2, ("cm",)),
     ("length", 1e-3, ("mm", "millimetre", "millimetres", "millimeter", "millimeters")),
     ("length", 1e-6, ("um", "micron", "microns")),
-    ("angular velocity", 1.0, ("rad/s", "rad s^-1", "rad s-1", "rad/sec")),
+    ("length", 0.0254, ("in", "inch", "inches")),
+    ("angular velocity", 1.0, ("rad/s", "rad s^-1", "rad s-1", "rad/sec", "radian/s", "radians/s")),
     ("angular velocity", 1e-3, ("mrad/s",)),
     (
         "angular velocity",
@@ -86,9 +96,17 @@ _TABLE: Final[tuple[tuple[Kind, float, tuple[str, ...]], ...]] = (
     ("torque", 1e-6, ("uN m", "uNm")),
     ("torque", 1e3, ("kN m", "kNm")),
     ("torque", 1e-2, ("N cm", "Ncm")),
+    ("torque", 1e-3, ("N mm", "Nmm")),
+    ("torque", _POUND * 0.0254, ("lbf in", "lb in", "in lbf", "in lb")),
+    ("torque", _POUND * 0.3048, ("lbf ft", "lb ft", "ft lbf", "ft lb")),
+    ("torque", _POUND * 0.0254 / 16.0, ("ozf in", "oz in", "in oz")),
+    ("torque", _KILOPOND, ("kgf m", "kp m")),
+    ("torque", 1e-2 * _KILOPOND, ("kgf cm", "kp cm")),
     ("force", 1.0, ("N", "newton", "newtons")),
     ("force", 1e-3, ("mN",)),
     ("force", 1e3, ("kN",)),
+    ("force", _POUND, ("lbf",)),
+    ("force", _KILOPOND, ("kgf", "kp")),
     ("current", 1.0, ("A", "amp", "amps", "ampere", "amperes")),
     ("current", 1e-3, ("mA",)),
     ("voltage", 1.0, ("V", "volt", "volts")),
@@ -120,7 +138,7 @@ def si_word(quantity: Quantity, axis: Axis) -> str:
 
 def known_unit(word: str) -> Unit | None:
     """The unit that a word means, None for a word that is no unit of ours."""
-    plain = unicodedata.normalize("NFKC", word).replace("μ", "u").replace("°", "deg")
+    plain = unicodedata.normalize("NFKC", word).replace("μ", "u").replace("°", "deg").replace("−", "-")
     plain = re.sub(r"\s*/\s*", "/", re.sub(r"[\s·⋅*.]+", " ", plain)).strip()
     return _UNITS.get(plain) or (_UNITS.get(plain.lower()) if plain.lower() in _ANY_CASE else None)
 
@@ -140,12 +158,17 @@ def parse_unit(word: str) -> Unit:
         When it is unknown; the message names the nearest known words.
     """
     unit = known_unit(word)
-    if unit is not None:
-        return unit
+    if unit is None:
+        raise LogError(f"{word!r} is {unknown_unit(word)}")
+    return unit
+
+
+def unknown_unit(word: str) -> str:
+    """What is to be said of a word that is no unit of ours, with the nearest that are."""
     near = difflib.get_close_matches(word.strip(), _UNITS, n=3, cutoff=0.4)
     near += [known for known in _UNITS if known.lower() == word.strip().lower() and known not in near]
     listed = ", ".join(dict.fromkeys(_UNITS[known].word for known in near)) or ", ".join(_SI.values())
-    raise LogError(f"{word!r} is not a unit known here; the nearest are {listed}")
+    return f"not a unit known here; the nearest are {listed}"
 
 
 def factor_to_si(

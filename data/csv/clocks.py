@@ -16,19 +16,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from data.alignment import align
-from data.columns import TIME_NAMES, bare
+from data.columns import TIME_NAMES, bare, is_time
 from data.csv.layout import CsvLayout
 from data.csv.log import CsvTable, elapsed_together, find_column
 from data.findings import LogError
 from data.names import shown
+from data.units import known_unit
 
 FloatArray = NDArray[np.float64]
 _PLAIN: Final = (*TIME_NAMES, "datetime", "x_value", "zeit")  # pandas', LabVIEW's, and in German
 
 
 def time_columns(layout: CsvLayout) -> tuple[int, ...]:
-    """The columns that are plainly the time."""
-    return tuple(k for k, header in enumerate(layout.headers) if bare(header).lower() in _PLAIN)
+    """The columns that are plainly the time: the first, and those that are called as it is.
+
+    Only tables whose columns have clocks of their own give several the same name.
+    """
+    plain = [k for k, header in enumerate(layout.headers) if is_time(header, _PLAIN) and _may_be(layout, k)]
+    names = [bare(layout.headers[k]).lower() for k in plain]
+    return tuple(k for k, name in zip(plain, names, strict=True) if name == names[0])
+
+
+def _may_be(layout: CsvLayout, column: int) -> bool:
+    """Whether a column's unit lets it be a time."""
+    unit = known_unit(layout.units[column] or "s")
+    return unit is None or unit.kind == "time"
 
 
 def governing(layout: CsvLayout, column: int) -> int | None:

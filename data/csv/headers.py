@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from data.columns import NO_UNIT
 from data.csv.cells import is_number
 from data.csv.records import Record
 from data.findings import LogError
@@ -28,7 +29,6 @@ _COLUMN_SETTING: Final = re.compile(
     re.IGNORECASE,
 )
 _MOST_SETTINGS: Final = 1000
-_NO_UNIT: Final = ("", "-", "1", "(none)", "none")
 LABVIEW_END: Final = "***End_of_Header***"
 
 
@@ -158,11 +158,16 @@ def _joined_units(row: Sequence[str]) -> list[str]:
 
 def _take_units(found: Above, row: Sequence[str], columns: int) -> None:
     words = [word.strip("[]() ") for word in (*row, *[""] * (columns - len(row)))][:columns]
-    found.units = [word if word and known_unit(word) else None for word in words]
+    found.units = [word if _is_unit(word) else None for word in words]
     found.units_row = True
-    strange = [word for word in words if word.lower() not in _NO_UNIT and not known_unit(word)]
+    strange = [word for word in words if word.lower() not in NO_UNIT and not known_unit(word)]
     if strange and not (len(strange) == 1 and _UNITS_ROW.match(strange[0])):
         found.note("units", ", ".join(words))
+
+
+def _is_unit(word: str) -> bool:
+    """Whether a word in a unit's place is meant as one, be it known here or not."""
+    return word.lower() not in NO_UNIT and not _UNITS_ROW.match(word) and not is_number(word, ".")
 
 
 def is_units_row(row: Sequence[str], columns: int) -> bool:
@@ -173,7 +178,7 @@ def is_units_row(row: Sequence[str], columns: int) -> bool:
     if _UNITS_ROW.match(first):
         return True
     words = [word.strip("[]() ") for word in row]
-    known = [known_unit(word) is not None for word in words if word.lower() not in _NO_UNIT]
+    known = [known_unit(word) is not None for word in words if word.lower() not in NO_UNIT]
     # A header of single letters (`t`, `s`, `A`) is rarely all units; two known words, or a 1, make a row.
     enough = min(2, columns) - any(word in {"-", "1"} for word in words)
     return len(known) >= max(enough, 1) and all(known)
@@ -190,9 +195,10 @@ def _read_column_settings(found: Above, row: Sequence[str], columns: int) -> Non
         setting = _COLUMN_SETTING.fullmatch(cell)
         if setting is None:
             continue
-        if setting[1].lower() in {"unit", "units", "einheit"} and known_unit(setting[2]):
+        word = setting[2].strip("[]() ")
+        if setting[1].lower() in {"unit", "units", "einheit"} and _is_unit(word):
             found.units = found.units or [None] * columns
-            found.units[k] = setting[2].strip("[]() ")
+            found.units[k] = word
         found.note(f"{found.of_column(k)} {setting[1]}", setting[2])
 
 
@@ -255,6 +261,7 @@ def _read_pairs(found: Above, rows: Sequence[list[str]]) -> None:
     for row in rows[1:]:
         for k, (label, value) in enumerate(zip(row[0::2], row[1::2], strict=False)):
             if k < len(channels) and _UNITS_ROW.match(label):
-                found.units[2 * k + 1] = value.strip("[]() ") if known_unit(value.strip("[]() ")) else None
+                word = value.strip("[]() ")
+                found.units[2 * k + 1] = word if _is_unit(word) else None
             if k < len(channels) and label and value:
                 found.note(f"{channels[k]} {label}", value)

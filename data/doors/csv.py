@@ -8,13 +8,13 @@ from data.began import began, since_1970
 from data.csv.clocks import clocks_of, on_clock, time_column
 from data.csv.dialect import sniff
 from data.csv.log import elapsed, find_column, read_csv, table_integrity
-from data.doors.door import Door, Logged, after_first, interval, require_unit, unset
+from data.doors.door import Door, Logged, after_first, interval, require_sane_clock, require_unit, unset
 from data.elapsed import unset_lead
 from data.findings import Finding, LogError, Severity
 from data.mcap.records import ByteArray
 from data.names import shown
 from data.signals import Signal
-from data.units import same_unit
+from data.units import known_unit, same_unit
 
 
 def read_csv_log(door: Door, content: ByteArray) -> Logged:
@@ -27,7 +27,8 @@ def read_csv_log(door: Door, content: ByteArray) -> Logged:
         }
         asked = door.signals.time
         column = time_column(layout, asked.source if asked else None, columns["position"])
-        time = asked or Signal(column, unit=layout.units[column])
+        unit = layout.units[column]
+        time = asked or Signal(column, unit=unit if known_unit(unit or "") else None)
         clocks = clocks_of(layout, columns, column)
         for quantity, signal in wanted.items():
             require_unit(quantity, signal, layout.units[columns[quantity]], axis=door.axis)
@@ -44,6 +45,7 @@ def read_csv_log(door: Door, content: ByteArray) -> Logged:
         raise LogError(said if said.startswith(door.log) else f"{door.log}: {said}") from error
     name = f"column {shown(layout.headers[column] if layout.headers else str(column))!r}"
     stamps = door.convert("time", interval(time), table.values[column][: read.rows])
+    require_sane_clock(door, stamps)
     lead = unset_lead(stamps)
     held = tuple(
         Finding("E-CLOCK", Severity.WARN, f"{quantity} {text}", door.log)

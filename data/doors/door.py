@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,9 +13,16 @@ from numpy.typing import NDArray
 from data.findings import Finding, LogError, Severity
 from data.recording import Axis
 from data.signals import Signal, Signals, log_format
-from data.units import Quantity, known_unit, same_unit, si_word
+from data.units import Quantity, known_unit, same_unit, si_word, unknown_unit
 
 FloatArray = NDArray[np.float64]
+
+
+_LATEST: Final = 1e11  # [s] that a clock counts from a date: the year 5138; Windows counts from 1601
+_YEAR: Final = 3.156e7  # [s]
+_SMALLER: Final = (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
+_DATES: Final = (3e8, 5e9)  # [s] since 1970, which a log may be from
+_SHORTEST: Final = 1e-7  # [s] between samples
 
 
 @dataclass(frozen=True)
@@ -84,8 +92,16 @@ def unset(door: Door, lead: int, clock: str) -> tuple[Finding, ...]:
 
 def require_unit(quantity: Quantity, signal: Signal, declared: str | None, *, axis: Axis) -> None:
     """Refuse a file that declares another unit than the campaign does."""
-    if declared is None or known_unit(declared) is None:
+    if declared is None:
         return
+    if known_unit(declared) is None:
+        if signal.unit is not None:
+            return
+        raise LogError(
+            f"E-UNIT refuse: the log declares {quantity} in {declared!r}, {unknown_unit(declared)}; as SI, "
+            f"every parameter drawn from it would be wrong. Say `unit` on {quantity} in [signals], and "
+            "`scale` where no known unit fits"
+        )
     stated = signal.unit or si_word(quantity, axis)
     if same_unit(stated, declared):
         return
@@ -95,6 +111,27 @@ def require_unit(quantity: Quantity, signal: Signal, declared: str | None, *, ax
         f"parameter drawn from it would be wrong by their ratio. If the log is right, set "
         f'unit = "{declared}" on {quantity}'
     )
+
+
+def require_sane_clock(door: Door, stamps: FloatArray) -> None:
+    """Refuse times (n,) [s] that no clock of a rig tells: their unit is another."""
+    known = stamps[np.isfinite(stamps)]
+    if not known.size:
+        return
+    latest = float(np.max(np.abs(known)))
+    if latest > _LATEST:
+        words = [word for word, size in _SMALLER if _DATES[0] < latest * size < _DATES[1]]
+        likely = f'likely in {words[0]}; set unit = "{words[0]}"' if words else "set its `unit`"
+        raise LogError(
+            f"{door.log}: E-UNIT refuse: the time reaches {latest:.4g} s, {latest / _YEAR:.3g} years: "
+            f"{likely} on time in [signals]. (A date is no number: write it as 2024-05-31 12:00:00.001)"
+        )
+    step = float(np.median(np.abs(np.diff(known)))) if known.size > 2 else 1.0
+    if 0.0 < step < _SHORTEST:
+        raise LogError(
+            f"{door.log}: E-UNIT refuse: the time steps by {step:.3g} s, {1.0 / step:.3g} Hz: no rig is "
+            "sampled so fast. Set its `unit` on time in [signals]"
+        )
 
 
 def after_first(logged: Logged) -> Logged:

@@ -13,7 +13,7 @@ from data.alignment import align
 from data.bag.columns import read_columns as read_bag_columns
 from data.began import began
 from data.clocks import drift
-from data.doors.door import Door, FloatArray, Logged, after_first, interval, unset
+from data.doors.door import Door, FloatArray, Logged, after_first, interval, require_sane_clock, unset
 from data.elapsed import since_first, unset_lead
 from data.findings import Finding, LogError, Severity
 from data.integrity import Integrity
@@ -77,7 +77,9 @@ def _read(door: Door, columns: _Columns, surveyed: Callable[[], Integrity]) -> L
         if path.topic != paths["position"].topic:
             raise LogError(f"{door.log}: time must be a field of the position's topic, not of {path.topic!r}")
         time, name = interval(named["time"]), f"field {path.text}"
-        lead = unset_lead(door.convert("time", time, topic.values[path.text]))
+        stamps = door.convert("time", time, topic.values[path.text])
+        require_sane_clock(door, stamps)
+        lead = unset_lead(stamps)
         seconds = door.convert("time", time, since_first(topic.ticks[lead:]))
     findings += unset(door, lead, name)
     signals = {quantity: values[lead:] for quantity, values in signals.items()}

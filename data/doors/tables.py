@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 
+import numpy as np
+
 from data.began import began
-from data.doors.door import Door, FloatArray, Logged, interval, require_unit, unset
+from data.doors.door import Door, FloatArray, Logged, interval, require_sane_clock, require_unit, unset
 from data.elapsed import unset_lead
 from data.findings import LogError
 from data.mat.log import MatLog
@@ -15,7 +17,7 @@ from data.names import shown
 from data.parquet.log import ParquetLog
 from data.signals import Signal, log_format
 from data.tables.table import TIME_NAMES, Column, TableFile, Values, require_numbers
-from data.units import Quantity
+from data.units import Quantity, known_unit
 
 
 def read_parquet_log(door: Door, content: ByteArray) -> Logged:
@@ -47,13 +49,16 @@ def _converted(door: Door, table: TableFile) -> Logged:
         column = table.columns[places[quantity]]
         require_numbers(column)
         require_unit(quantity, signal, column.unit, axis=door.axis)
-    read = table.read(sorted(set(places.values())))
+    clocks = {} if door.signals.time is not None else _clocks(table, wanted)
+    read = table.read(sorted({*places.values(), *clocks.values()}))
     findings = read.integrity.require(door.log, salvage=door.salvage)
     columns = {quantity: table.columns[place] for quantity, place in places.items()}
     values = {quantity: read.values[place] for quantity, place in places.items()}
     _require_alike(columns, values)
+    _require_one_clock(table, clocks, read.values)
     clock = f"column {shown(columns['time'].name)!r}"
     stamps = door.convert("time", interval(time), _floats(columns["time"], values["time"], stamp=True))
+    require_sane_clock(door, stamps)
     lead = unset_lead(stamps)
     return Logged(
         time=door.convert("time", interval(time), values["time"].since_first(lead)),
@@ -82,7 +87,31 @@ def _places(
             f"[signals] names no time for {kind} logs, and no column is plainly the time "
             f'(one of {", ".join(TIME_NAMES)}); add time = {{ {kind} = "..." }}'
         )
-    return Signal(place, unit=table.columns[place].unit), places | {"time": place}
+    unit = table.columns[place].unit
+    return Signal(place, unit=unit if known_unit(unit or "") else None), places | {"time": place}
+
+
+def _clocks(table: TableFile, wanted: Mapping[Quantity, Signal]) -> dict[Quantity, int]:
+    """Where the time stands that is plainly each quantity's own."""
+    found = {quantity: table.plain_time(signal.source) for quantity, signal in wanted.items()}
+    return {quantity: place for quantity, place in found.items() if place is not None}
+
+
+def _require_one_clock(
+    table: TableFile, clocks: Mapping[Quantity, int], values: Mapping[int, Values]
+) -> None:
+    """Refuse a signal that was sampled at other times than the position."""
+    own = clocks.get("position")
+    for quantity, place in clocks.items():
+        if own is None or place == own:
+            continue
+        if not np.array_equal(values[place].stored, values[own].stored, equal_nan=True):
+            names = [shown(table.columns[k].name) for k in (place, own)]
+            raise LogError(
+                f"{quantity} stands beside a time of its own, {names[0]}, which differs from the position's, "
+                f"{names[1]}: paired row by row, every torque would belong to another instant. Save them on "
+                "one clock, or name the `time` in [signals] if that one is right for both"
+            )
 
 
 def _floats(column: Column, values: Values, *, stamp: bool = False) -> FloatArray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from data.columns import is_time
 from data.findings import LogError
 from data.integrity import Checksums, Integrity, Loss
 from data.mat.arrays import Leaf, Numbers, Refused, Setting, leaves, numbers
@@ -111,7 +112,7 @@ class MatLog:
             prefix = f"{around}." if around else ""
             for k, column in enumerate(self.columns):
                 name = column.name.removeprefix(prefix)
-                if column.name.startswith(prefix) and name.lower() in TIME_NAMES and column.refused is None:
+                if column.name.startswith(prefix) and is_time(name, TIME_NAMES) and column.refused is None:
                     return k
         return None
 

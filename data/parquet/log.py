@@ -17,7 +17,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from data.columns import bare, called, declared_unit
+from data.columns import called, declared_unit, is_time
 from data.findings import LogError
 from data.integrity import Checksums, Integrity, Loss
 from data.mcap.records import ByteArray
@@ -106,7 +106,7 @@ class ParquetLog:
     def plain_time(self, beside: str | int) -> int | None:
         """The column with a plain name for it, else the only one of stamps."""
         for k, column in enumerate(self.columns):
-            if bare(column.name).lower() in TIME_NAMES and column.refused is None:
+            if is_time(column.name, TIME_NAMES) and column.refused is None:
                 return k
         stamps = [k for k, field in enumerate(self._schema) if pa.types.is_timestamp(field.type)]
         return stamps[0] if len(stamps) == 1 else None

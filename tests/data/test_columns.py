@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from data.columns import bare, called, declared_unit, require_one_length, value_range
+from data.columns import bare, called, declared_unit, is_time, require_one_length, value_range
 from data.findings import LogError
 
 
@@ -20,7 +20,12 @@ from data.findings import LogError
         ("speed_rpm", "speed_rpm", "rpm"),
         ("q", "q", None),
         ("q_mm", "q_mm", None),  # mm may be a motor's name
-        ("u [dogs]", "u", None),
+        ("u [dogs]", "u", "dogs"),  # no unit known here, and meant as one
+        ("u (Nm/V)", "u", "Nm/V"),
+        ("u (filtered)", "u", None),
+        ("q[0]", "q", None),
+        ("u [-]", "u", None),
+        ("[q]", "", None),
         ("rpm", "rpm", None),
     ],
 )
@@ -33,6 +38,12 @@ def test_a_name_to_the_letter_comes_before_one_without_its_unit() -> None:
     assert called(["q [deg]", "u"], "q") == [0]
     assert called(["q [deg]", "q [rad]"], " q ") == [0, 1]
     assert called(["u"], "q") == []
+
+
+def test_a_capital_t_is_no_time() -> None:
+    assert [name for name in ("t", "T", "Time [s]", "TIMESTAMP", "__time", "times") if is_time(name)] == [
+        "t", "Time [s]", "TIMESTAMP", "__time"
+    ]  # fmt: skip
 
 
 def test_the_range_is_of_finite_numbers() -> None:

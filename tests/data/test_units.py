@@ -27,6 +27,17 @@ from data.units import Quantity, factor_to_si, known_unit, parse_unit, same_unit
         ("ms", "time", 1e-3),
         ("µs", "time", 1e-6),
         ("ns", "time", 1e-9),
+        ("h", "time", 3600.0),
+        ("days", "time", 86_400.0),
+        ("arcmin", "position", math.pi / 10_800),
+        ("gon", "position", math.pi / 200),
+        ("µrad", "position", 1e-6),
+        ("N·mm", "torque", 1e-3),
+        ("lbf·ft", "torque", 1.3558179483314004),  # NIST SP 811, B.8
+        ("lbf in", "torque", 0.1129848290276167),
+        ("oz in", "torque", 0.00706155181422604),
+        ("kgf cm", "torque", 0.0980665),
+        ("min⁻¹", "velocity", math.pi / 30),
         (None, "torque", 1.0),
     ],
 )
@@ -36,9 +47,14 @@ def test_factors(word: str | None, quantity: Quantity, size: float) -> None:
 
 
 def test_a_linear_axis_has_its_own_units() -> None:
-    for word, quantity, size in (("mm", "position", 1e-3), ("mm/s", "velocity", 1e-3), ("kN", "torque", 1e3)):
+    for word, quantity, size in (
+        ("mm", "position", 1e-3),
+        ("mm/s", "velocity", 1e-3),
+        ("kN", "torque", 1e3),
+        ("lbf", "torque", 4.4482216152605),
+    ):
         factor = factor_to_si(word, quantity=quantity, axis="linear", encoder_counts=None, scaled=False)  # type: ignore[arg-type]  # the words of the tuple
-        assert factor == size
+        assert factor == pytest.approx(size, rel=1e-15)
     assert si_word("torque", "linear") == "N"
     assert si_word("velocity", "rotary") == "rad/s"
     with pytest.raises(LogError, match='axis = "linear"'):
@@ -57,7 +73,7 @@ def test_amperes_need_a_scale_and_counts_their_number() -> None:
 
 @pytest.mark.parametrize(
     ("word", "near"),
-    [("degs", "deg"), ("Nmm", "N m"), ("NM", "N m"), ("radians/s", "rad/s"), ("xyzzy", "rad")],
+    [("degs", "deg"), ("NM", "N m"), ("radian/sek", "rad/s"), ("Grad", "rad"), ("xyzzy", "rad")],
 )
 def test_an_unknown_word_names_its_nearest(word: str, near: str) -> None:
     with pytest.raises(LogError, match=f"not a unit known here.*{near}"):

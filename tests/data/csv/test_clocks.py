@@ -123,8 +123,11 @@ def test_a_clock_with_holes_is_refused(tmp_path: Path) -> None:
 
 
 def test_columns_of_times_govern_those_to_their_right() -> None:
-    layout = sniff(b"timestamp,t,q,u,time,i\n0,0,1,2,0,3\n1,1,1,2,0,3\n")
+    layout = sniff(b"n,time,q,u,Time,i\n0,0,1,2,0,3\n1,1,1,2,0,3\n")
     assert [governing(layout, k) for k in (2, 3, 5)] == [1, 1, 4]
+    for names in (b"t,T,q,u", b"time,q,timestamp,u", b"time,q,T [degC],u", b"t,q,time [rad],u"):
+        layout = sniff(names + b"\n0,0,1,2\n1,1,1,2\n")
+        assert {governing(layout, k) for k in range(1, 4)} == {0}  # times of other names are no other clocks
     assert governing(sniff(b"q,u,t\n0,0,1\n1,1,1\n"), 0) == 2
     assert governing(sniff(b"q,u\n0,0\n1,1\n"), 0) is None
 
