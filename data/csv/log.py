@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from data.columns import called, require_one_length
 from data.csv.cells import NO_NUMBER, NotNumbersError, numbers
-from data.csv.dates import are_dates, no_number, seconds_written
+from data.csv.dates import TimeCells, no_number
 from data.csv.layout import CsvLayout
 from data.csv.rows import Block, Rows, Tally, whole_rows
 from data.csv.text import ByteArray, open_text
@@ -108,15 +108,14 @@ def read_csv(
     parts: dict[int, list[FloatArray]] = {k: [] for k in columns}
     texts: dict[int, list[pa.Array]] = {k: [] for k in columns if k in stamps}
     reasons: dict[int, str] = {}
-    dated: dict[int, bool] = {}  # by column of times, as its first block has it
+    dates = {k: TimeCells(layout.decimal) for k in columns if k in stamps}
     found = Tally()
     for block in whole_rows(open_text(content, layout.encoding), layout, found):
         if not block.rows:
             continue
         for k, found_cells in _columns(block, layout, list(parts)).items():
             try:
-                is_dated = k in texts and dated.setdefault(k, are_dates(found_cells))
-                cells = seconds_written(found_cells, layout.decimal) if is_dated else found_cells
+                cells = dates[k].read(found_cells) if k in texts else found_cells
                 parts[k].append(numbers(cells, layout.decimal))
             except NotNumbersError as error:
                 reasons[k] = _no_number(layout, k, found.kept - block.rows + error.row, error)
@@ -133,7 +132,7 @@ def read_csv(
         rows=found.rows,
         written={k: pa.chunked_array(pieces, pa.string()) for k, pieces in texts.items()},
         reasons=reasons,
-        dated=frozenset(k for k, own in dated.items() if own),
+        dated=frozenset(k for k, own in dates.items() if own.dated and k in parts),
     )
 
 

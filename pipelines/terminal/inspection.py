@@ -264,7 +264,7 @@ def _columns(content: CsvDescription | TableDescription) -> Table:
 
 def _remark(column: Column | DescribedColumn, rows: int) -> str:
     if column.text is not None:
-        return "no numbers: " + shown(column.text, 80)
+        return "no numbers: " + shown(column.text, 200)
     own = column.rows if isinstance(column, DescribedColumn) else rows
     parts = [
         f"{own} values" if own != rows else "",

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from data.csv.cells import NotNumbersError
-from data.csv.dates import are_dates, is_date, seconds_written
+from data.csv.dates import TimeCells, kind_of
 from data.csv.description import describe
 from data.findings import LogError
 from data.ingest import read_recording
@@ -27,7 +27,7 @@ TORQUE = 0.4 * np.sign(np.cos(2 * TIME)) + 0.2 * np.cos(2 * TIME)
 
 
 def written(*cells: str, decimal: str = ".") -> list[str]:
-    return list(seconds_written(pa.array(cells), "," if decimal == "," else ".").to_pylist())
+    return list(TimeCells("," if decimal == "," else ".").read(pa.array(cells)).to_pylist())
 
 
 @settings(max_examples=300, deadline=None)
@@ -40,16 +40,22 @@ def test_every_moment_in_every_way(moment: datetime, zone: int | None, nanosecon
     end = "" if zone is None else "Z" if zone == 0 else f"{offset[:3]}:{offset[3:]}"
     clock = f"{moment:%H:%M:%S}{sign}{moment.microsecond:06d}{nanoseconds:03d}"
     days = (f"{moment.year:04d}-{moment:%m-%d}", f"{moment.day}.{moment.month}.{moment.year:04d}")
-    for day in (*days, days[0].replace("-", "/")):
+    for day in (*days, days[0].replace("-", "/"), f"{moment.day:02d}-{moment:%b}-{moment.year:04d}"):
         for text in (f"{day} {clock}{end}", f"{day}T{clock}{end}", f" {day} {clock} {end}"):
-            assert is_date(text)
+            assert kind_of(text.strip()) == ("date" if zone is None else "zoned")
             (cell,) = written(text, decimal=sign)
             assert Decimal(cell.replace(",", ".")) == exact
 
 
 @pytest.mark.parametrize(
     ("cell", "seconds"),
-    [("09:00:00.5", "32400.5"), ("9:00", "32400"), ("23:59:59,999999999", "86399.999999999")],
+    [
+        ("09:00:00.5", "32400.5"),
+        ("9:00:00", "32400"),
+        ("23:59:59,999999999", "86399.999999999"),
+        ("0 days 00:00:01.5", "1.5"),
+        ("3 days 00:00:00", "259200"),
+    ],
 )
 def test_times_of_day_are_seconds_since_midnight(cell: str, seconds: str) -> None:
     assert Decimal(written(cell)[0]) == Decimal(seconds)
@@ -57,8 +63,23 @@ def test_times_of_day_are_seconds_since_midnight(cell: str, seconds: str) -> Non
 
 def test_what_is_missing_stays_missing() -> None:
     assert written("2024-05-01 00:00:00", "", "NaN") == ["1714521600.000000000", "", "NaN"]
-    assert are_dates(pa.array(["", "nan", "2024-05-01"]))
-    assert not are_dates(pa.array(["", "3.5", "2024-05-01"]))
+    cells = TimeCells(".")
+    assert cells.read(pa.array(["", "nan"])).to_pylist() == ["", "nan"]  # a block that says nothing
+    assert cells.read(pa.array(["", "2024-05-01"])).to_pylist() == ["", "1714521600.000000000"]
+    assert cells.dated
+    numbers = TimeCells(".")
+    assert numbers.read(pa.array(["", "3.5", "2024-05-01"])).to_pylist() == ["", "3.5", "2024-05-01"]
+    assert not numbers.dated
+
+
+def test_midnight_passes() -> None:
+    cells = TimeCells(".")
+    first = cells.read(pa.array(["23:59:58", "", "23:59:59", "00:00:00.5"])).to_pylist()
+    second = cells.read(pa.array(["12:00:00", "23:00:00", "01:00:00"])).to_pylist()
+    seconds = [float(cell) for cell in (*first, *second) if cell]
+    assert seconds == [86_398, 86_399, 86_400.5, 129_600, 169_200, 176_400]
+    back = TimeCells(".").read(pa.array(["12:00:01", "12:00:00", "11:00:00"])).to_pylist()
+    assert [float(cell) for cell in back] == [43_201, 43_200, 39_600]  # a clock that was set is no midnight
 
 
 @pytest.mark.parametrize(
@@ -66,7 +87,9 @@ def test_what_is_missing_stays_missing() -> None:
     [
         (["2024-05-01", "2024-02-30"], 1, "no such date"),
         (["25:00:00"], 0, "no such date"),
-        (["2024-05-01 10:00:00", "2024-05-01 10:00:01Z"], 1, "or not as the others"),
+        (["2024-05-01 10:00:00", "2024-05-01 10:00:01Z"], 1, "of another form"),
+        (["", "2024-05-01 10:00:00+02:00", "2024-05-01 10:00:01"], 2, "of another form"),
+        (["2024-05-01 10:00:00", "10:00:01"], 1, "of another form"),
         (["2024-05-01", "3"], 1, "no date, as the others are"),
         (["1960-01-01"], 0, "before 1970"),
     ],
@@ -131,3 +154,10 @@ def test_a_clock_that_turns_to_numbers_is_refused(tmp_path: Path) -> None:
     cells[2000:] = [f"{value:.3f}" for value in TIME[2000:].tolist()]
     with pytest.raises(LogError, match=r"holds '8\.000' in row 2001 of the numbers: no date, as the others"):
         read(log(tmp_path / "run.csv", cells))
+
+
+@pytest.mark.parametrize("cell", ["00:05", "12:00:00:123", "20260501T120000", "01.05.26 12:00:00"])
+def test_what_could_be_two_times_is_none(cell: str) -> None:
+    assert kind_of(cell) == "number"
+    content = f"time,q,u\n{cell},1,2\n{cell},2,3\n".encode()
+    assert "a form that is not read" in str(describe(content).columns[0].text)
