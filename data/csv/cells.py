@@ -24,12 +24,12 @@ Decimal = Literal[".", ","]
 NO_NUMBER: Final = "no number"
 BLANKS: Final = " \t\x0b\x0c"
 _NUMBER: Final = {
-    ".": r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(?i:nan|inf|infinity|1\.#inf)",
-    ",": r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(?i:nan|inf|infinity|1[.,]#inf)",
+    ".": r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(?i:nan|inf|infinity|1\.#inf0*)",
+    ",": r"[+-]?(\d+,?\d*|,\d+)([eE][+-]?\d+)?|[+-]?(?i:nan|inf|infinity|1[.,]#inf0*)",
 }
 _IS_NUMBER: Final = {sign: re.compile(rule, re.ASCII) for sign, rule in _NUMBER.items()}
 _IS_MISSING: Final = re.compile(
-    r"(|[+-]?nan|#?na|#?n/a|<na>|#n/a n/a|null|none|[+-]?1[.,]#(ind|qnan))", re.IGNORECASE
+    r"(|[+-]?nan|#?na|#?n/a|<na>|#n/a n/a|null|none|[+-]?1[.,]#(ind|s?q?nan)0*)", re.IGNORECASE
 )
 
 
@@ -117,7 +117,7 @@ def _one_by_one(cells: pa.Array, decimal: Decimal) -> FloatArray:
             row = pc.index(trimmed, cell).as_py()
             raise NotNumbersError(row, cell)
     plain = pc.replace_substring(trimmed, ",", ".") if decimal == "," else trimmed
-    plain = pc.replace_substring_regex(plain, r"(?i)1\.#inf", "inf")
+    plain = pc.replace_substring_regex(plain, r"(?i)1\.#inf0*", "inf")
     plain = pc.if_else(numeric, plain, pa.scalar("nan"))
     values: FloatArray = pc.cast(plain, pa.float64()).to_numpy(zero_copy_only=False)
     return _finite_as_written(trimmed, values)

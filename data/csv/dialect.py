@@ -103,8 +103,14 @@ def _layout(head: Sequence[str], frozen: CsvDialect, encoding: str) -> CsvLayout
             f"{frozen.lines_before_numbers} lines stand before the first (`lines_before_numbers`): samples "
             "would be passed over. Correct it, or leave it out"
         )
+    _require_one_table(top[:first], rows[:first], columns=columns, decimal=decimal, marks=marks)
     found = partial(
-        read_above, columns=columns, marks=marks, header=frozen.header, units_row=frozen.units_row
+        read_above,
+        columns=columns,
+        marks=marks,
+        header=frozen.header,
+        units_row=frozen.units_row,
+        open_end=all(not row[-1] for row in rows[first:] if len(row) == columns),
     )
     above = found(top[:first], rows[:first])
     if frozen.header and not above.names and frozen.lines_before_numbers is None and first + 1 < len(top):
@@ -262,7 +268,10 @@ def _with_damaged(
             continue
         filled = [cell for cell in rows[k] if cell]
         commented = bool(marks) and top[k].text.lstrip().startswith(marks)
-        damaged = "\0" in top[k].text or (bool(filled) and _LIKE_A_NUMBER.match(filled[0]) is not None)
+        numeric = len(filled) == 1 or any(is_number(cell, ".") or is_number(cell, ",") for cell in filled)
+        damaged = "\0" in top[k].text or (
+            bool(filled) and _LIKE_A_NUMBER.match(filled[0]) is not None and numeric
+        )
         if commented or not damaged:
             break
         start = k
@@ -287,6 +296,27 @@ def _require_no_hidden_row(
                 f"line {record.first + 1} begins with {shown(row[0], 30)!r}, which reads like a comment, but "
                 "a row of numbers follows: a sample would be lost unseen"
             )
+
+
+def _require_one_table(
+    above: Sequence[Record],
+    rows: Sequence[list[str]],
+    *,
+    columns: int,
+    decimal: Decimal,
+    marks: tuple[str, ...],
+) -> None:
+    """Refuse rows of numbers above the names: they would pass for settings."""
+    before = 0
+    for record, row in zip(above, rows, strict=True):
+        commented = bool(marks) and record.text.lstrip().startswith(marks)
+        numeric = len(row) > 1 and not commented and all(row) and numeric_share(row, decimal) == 1.0
+        if numeric and before == len(row):
+            raise LogError(
+                f"line {record.first} and that below it are rows of {len(row)} numbers, and further down it "
+                f"has rows of {columns}: two tables in one file, the first of which would be lost. Split it"
+            )
+        before = len(row) if numeric else 0
 
 
 def _is_row(

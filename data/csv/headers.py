@@ -29,6 +29,12 @@ _COLUMN_SETTING: Final = re.compile(
     re.IGNORECASE,
 )
 _MOST_SETTINGS: Final = 1000
+_NO_NAME: Final = re.compile(  # what stands between names and numbers and is neither a name nor a unit
+    r"(l?real|float(ieee)?|double|single|u?d?int|bool)\d*|[iu](8|16|32|64)|f(4|8|32|64)|smp|avg|tot|abs|rel|raw"
+    r"|[\d.,]+ [a-z]+|-",
+    re.IGNORECASE,
+)
+_LABVIEW_UNITS: Final = "Y_Unit_Label"
 LABVIEW_END: Final = "***End_of_Header***"
 
 
@@ -68,6 +74,7 @@ def read_above(
     marks: tuple[str, ...],
     header: bool | None,
     units_row: bool | None,
+    open_end: bool = False,
 ) -> Above:
     """Names, units and settings from the records above the numbers, whose cells are `rows`.
 
@@ -79,6 +86,8 @@ def read_above(
         What a comment begins with.
     header, units_row
         Whether there is a row of names, of units; None: found out.
+    open_end
+        Whether every row of numbers ends with a delimiter, so that its last cell is empty.
 
     Raises
     ------
@@ -91,13 +100,20 @@ def read_above(
     if header is not False and paired is not None:
         _read_pairs(found, rows[paired:])
         above, rows = above[:paired], rows[:paired]
+    nearest = len(above) - 1  # where names may be commented out
     for k in range(len(above) - 1, -1, -1):
         record, row = above[k], _trimmed(rows[k], columns)
-        if not record.text.strip() or record.text.startswith((LABVIEW_END, "sep=")):
+        if open_end and len(row) == columns - 1:
+            row.append("")
+        if not any(row) or record.text.startswith((LABVIEW_END, "sep=")):
             continue
         if marks and record.text.lstrip().startswith(marks):
             names = _commented_names(record, row, columns, marks)
-            if names and k == len(above) - 1 and header is not False and not found.names:
+            fresh = not (found.units or found.names) and units_row is not False
+            if names and fresh and is_units_row(names, columns):
+                _take_units(found, names, columns)
+                nearest = k - 1
+            elif names and k == nearest and header is not False and not found.names:
                 found.names = names
             else:
                 _read_comment(found, record, marks)
@@ -108,9 +124,9 @@ def read_above(
                 _read_setting(found, record, row)
         elif _is_column_settings(row):
             unnamed.append(row)
-        elif found.units is None and units_row is not False and (units_row or is_units_row(row, columns)):
+        elif found.units is None and _is_units(row, above[:k], rows[:k], columns, units_row=units_row):
             _take_units(found, row, columns)
-        elif _is_one_setting(row, columns):
+        elif _is_one_setting(row, columns) or (header is not True and _names_nothing(row)):
             _read_setting(found, record, row)
         else:
             _take_names(found, record, row, columns)
@@ -127,9 +143,39 @@ def _trimmed(row: Sequence[str], columns: int) -> list[str]:
     return cells
 
 
+def _is_units(
+    row: Sequence[str],
+    above: Sequence[Record],
+    rows: Sequence[list[str]],
+    columns: int,
+    *,
+    units_row: bool | None,
+) -> bool:
+    """Whether a row holds units; some words of it may be unknown here, if names stand above it."""
+    if units_row is not None:
+        return units_row
+    if is_units_row(row, columns):
+        return True
+    words = [word for word in map(_unit_word, row) if word.lower() not in NO_UNIT]
+    known = sum(known_unit(word) is not None for word in words)
+    if len(row) != columns or known < 2 or 2 * known < len(words) or not above:
+        return False
+    names = _trimmed(rows[-1], columns)
+    return (
+        len(names) == columns
+        and all(name and not is_number(name, ".") and not is_number(name, ",") for name in names)
+        and not any(known_unit(name) for name in names if len(name) > 1)
+    )
+
+
+def _names_nothing(row: Sequence[str]) -> bool:
+    """Whether a row holds types, rates and the like, which are neither names nor units."""
+    return all(not cell or _NO_NAME.fullmatch(cell) for cell in row)
+
+
 def _take_names(found: Above, record: Record, row: list[str], columns: int) -> None:
     filled = [cell for cell in row if cell]
-    if len(row) < columns and len(filled) == 1 < columns:
+    if len(filled) == 1 and columns > min(len(row), 2):
         _read_setting(found, record, row)  # a title
         return
     names = row if len(row) == columns else _joined_units(row)
@@ -157,12 +203,17 @@ def _joined_units(row: Sequence[str]) -> list[str]:
 
 
 def _take_units(found: Above, row: Sequence[str], columns: int) -> None:
-    words = [word.strip("[]() ") for word in (*row, *[""] * (columns - len(row)))][:columns]
+    words = [_unit_word(word) for word in (*row, *[""] * (columns - len(row)))][:columns]
     found.units = [word if _is_unit(word) else None for word in words]
     found.units_row = True
     strange = [word for word in words if word.lower() not in NO_UNIT and not known_unit(word)]
     if strange and not (len(strange) == 1 and _UNITS_ROW.match(strange[0])):
         found.note("units", ", ".join(words))
+
+
+def _unit_word(cell: str) -> str:
+    """A unit without its brackets; oscilloscopes write `in V`."""
+    return cell.strip("[]() ").removeprefix("in ")
 
 
 def _is_unit(word: str) -> bool:
@@ -177,7 +228,7 @@ def is_units_row(row: Sequence[str], columns: int) -> bool:
     first = row[0]
     if _UNITS_ROW.match(first):
         return True
-    words = [word.strip("[]() ") for word in row]
+    words = [_unit_word(word) for word in row]
     known = [known_unit(word) is not None for word in words if word.lower() not in NO_UNIT]
     # A header of single letters (`t`, `s`, `A`) is rarely all units; two known words, or a 1, make a row.
     enough = min(2, columns) - any(word in {"-", "1"} for word in words)
@@ -219,6 +270,9 @@ def _read_setting(found: Above, record: Record, row: Sequence[str]) -> None:
         found.note(setting[1], setting[2])
     elif len(filled) > 1 and row[0]:
         found.note(filled[0].rstrip(":"), ", ".join(filled[1:]))
+        if row[0] == _LABVIEW_UNITS and found.names and not found.units:
+            cells = [*row, *[""] * len(found.names)][: len(found.names)]
+            found.units = [None, *(word if _is_unit(word) else None for word in cells[1:])]
     else:
         found.note(f"line {record.first + 1}", ", ".join(filled))
 

@@ -7,12 +7,13 @@ import numpy as np
 from data.began import began, since_1970
 from data.csv.clocks import clocks_of, on_clock, time_column
 from data.csv.dialect import sniff
-from data.csv.log import elapsed, find_column, read_csv, table_integrity
+from data.csv.log import CsvTable, elapsed, find_column, read_csv, table_integrity
 from data.doors.door import Door, Logged, after_first, interval, require_sane_clock, require_unit, unset
 from data.elapsed import unset_lead
 from data.findings import Finding, LogError, Severity
 from data.mcap.records import ByteArray
 from data.names import shown
+from data.recording import Axis
 from data.signals import Signal
 from data.units import known_unit, same_unit
 
@@ -32,11 +33,10 @@ def read_csv_log(door: Door, content: ByteArray) -> Logged:
         clocks = clocks_of(layout, columns, column)
         for quantity, signal in wanted.items():
             require_unit(quantity, signal, layout.units[columns[quantity]], axis=door.axis)
-        for clock in {column, *clocks.values()}:
-            require_unit("time", time, layout.units[clock], axis=door.axis)
         stamped = {column, *clocks.values()}
         table = read_csv(content, layout, {*columns.values(), *stamped}, clocks=stamped)
-        _require_seconds(time, table.dated)
+        for clock in sorted(stamped):
+            _require_time_unit(time, clock, table, axis=door.axis)
         findings = table_integrity(table).require(door.log, salvage=door.salvage)
         one = float(door.convert("time", interval(time), np.ones(1))[0])
         read = on_clock(table, columns, clocks, seconds=one)
@@ -67,10 +67,13 @@ def read_csv_log(door: Door, content: ByteArray) -> Logged:
     return after_first(logged) if held else logged
 
 
-def _require_seconds(time: Signal, dated: frozenset[int]) -> None:
-    """Refuse another unit for times that are dates."""
-    if dated and (time.scale is not None or not same_unit(time.unit or "s", "s")):
+def _require_time_unit(time: Signal, column: int, table: CsvTable, *, axis: Axis) -> None:
+    """Refuse a column of times in another unit; dates are seconds, whatever their form is called."""
+    declared = table.layout.units[column]
+    if column not in table.dated:
+        require_unit("time", time, declared, axis=axis)
+    elif time.scale is not None or not same_unit(time.unit or "s", "s"):
         raise LogError(
-            f"column {min(dated)} holds dates or times of day, which are read as seconds; take the unit and "
-            "the scale of the time out of [signals], and out of the column's header"
+            f"column {column} holds dates or times of day, which are read as seconds; take the unit and the "
+            "scale of the time out of [signals], and out of the column's header"
         )
