@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from typing import Final
 
 from data.elapsed import EPOCH
-from data.units import parse_unit
+from data.units import known_unit
 
 KEYS: Final = ("began", "begun", "start", "started", "start_time", "recorded", "date", "datetime", "time")
 DAY: Final = len("2004-01-31")
@@ -19,7 +19,8 @@ _FILETIME: Final = 11_644_473_600.0  # [s] from 1601, where Windows begins to co
 
 def since_1970(stamp: float, unit: str | None) -> float:
     """A clock's stamp [s], counted from 1970 where its unit tells that it counts from elsewhere."""
-    windows = unit is not None and parse_unit(unit).word == "100 ns" and stamp > _FILETIME
+    known = known_unit(unit or "")
+    windows = known is not None and known.word == "100 ns" and stamp > _FILETIME
     return stamp - _FILETIME if windows else stamp
 
 

@@ -33,6 +33,9 @@ _IS_MISSING: Final = re.compile(
 )
 
 
+_THOUSANDS: Final = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)
+
+
 class NotNumbersError(Exception):
     """A column holds a cell that is no number: which row, and the cell."""
 
@@ -99,8 +102,33 @@ def numbers(cells: pa.Array, decimal: Decimal) -> FloatArray:
         except pa.ArrowInvalid:
             pass
         else:
+            _require_no_thousands(cells, decimal)
             return _finite_as_written(cells, values)
     return _one_by_one(cells, decimal)
+
+
+def _require_no_thousands(cells: pa.Array, decimal: Decimal) -> None:
+    """Refuse cells (n,) of which those with a decimal sign are whole thousands: `998`, `999`, `1,000`.
+
+    A sign that parts thousands divides them by a thousand; three places behind it in all cells that have one,
+    and none in any below a thousand, is no way to write decimals.
+    """
+    signed = pc.match_substring(cells, decimal)
+    with_sign = int(pc.sum(signed).as_py() or 0)
+    if not 0 < with_sign < len(cells):
+        return
+    first = pc.index(signed, True).as_py()
+    if not _THOUSANDS.fullmatch(str(cells[first].as_py())):
+        return
+    thousands = pc.match_substring_regex(cells, f"^{_THOUSANDS.pattern}$")
+    whole = pc.match_substring_regex(cells, r"^[+-]?\d{1,3}$")
+    if int(pc.sum(thousands).as_py()) == with_sign and pc.all(pc.or_(thousands, whole)).as_py():
+        raise NotNumbersError(
+            first,
+            str(cells[first].as_py()),
+            f"its sign {decimal!r} may part thousands: all cells with it have three digits behind it, and "
+            "others stand without. Write the numbers without such signs",
+        )
 
 
 def _any(cells: pa.Array, part: str) -> bool:

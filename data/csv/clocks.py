@@ -100,7 +100,7 @@ def clocks_of(layout: CsvLayout, columns: Mapping[str, int], time: int) -> dict[
 class OnClock:
     """A table's signals at the position's times; arrays (n,)."""
 
-    rows: int  # of the position's clock; its times may end before the table does
+    places: NDArray[np.intp]  # rows of the table that hold a position
     values: dict[str, FloatArray]  # as logged
     held: dict[str, str]  # by name: what is said of a signal that stood in for newer values
 
@@ -116,8 +116,11 @@ def on_clock(
         When a column of times has holes.
     """
     time = clocks["position"]
+    logged = {name: table.values[k] for name, k in columns.items()}
     if set(clocks.values()) == {time}:
-        return OnClock(table.rows.kept, {name: table.values[k] for name, k in columns.items()}, {})
+        if any(_is_sparse(values) for values in logged.values()):
+            return _together(table, logged, time, seconds=seconds)
+        return OnClock(np.arange(table.rows.kept), logged, {})
     order = list(dict.fromkeys((time, *clocks.values())))
     stamps = dict(zip(order, elapsed_together(table, order), strict=True))
     sizes = {clock: _size(table, clock) for clock in order}
@@ -126,20 +129,52 @@ def on_clock(
     held: dict[str, str] = {}
     for name, column in columns.items():
         clock = clocks[name]
-        logged = table.values[column][: sizes[clock]]
+        own = table.values[column][: sizes[clock]]
         if clock == time:
-            values[name] = logged
+            values[name] = own
             continue
-        aligned = align(ticks[time], ticks[clock], logged)
-        values[name] = aligned.values
-        period = float(np.median(np.diff(ticks[time]))) * 1e-9 if sizes[time] > 1 else 0.0
-        if not aligned.together:
+        values[name], said = _aligned(ticks[time], ticks[clock], own)
+        if said:
             held[name] = (
                 f"stands on the clock of column {clock} and was brought onto the position's, column {time}: "
-                f"its last value was held for up to {aligned.longest_hold:.4g} s"
-                + (f", {aligned.longest_hold / period:.3g} position samples" if period > 0.0 else "")
+                f"{said}"
             )
-    return OnClock(sizes[time], values, held)
+    return OnClock(np.arange(sizes[time]), values, held)
+
+
+def _is_sparse(values: FloatArray) -> bool:
+    """Whether a signal stands in few of the rows (n,), every other one or fewer: at instants of its own."""
+    known = np.flatnonzero(np.isfinite(values))
+    return known.size > 2 and float(np.median(np.diff(known))) >= 2.0
+
+
+def _together(table: CsvTable, logged: Mapping[str, FloatArray], time: int, *, seconds: float) -> OnClock:
+    """Signals of one clock that were sampled at different instants, at those of the position.
+
+    PlotJuggler writes a row for every instant of any topic, with empty cells for the others.
+    """
+    ticks = np.rint(elapsed_together(table, [time])[0] * seconds * 1e9)
+    timed = np.isfinite(ticks)
+    places = np.flatnonzero(np.isfinite(logged["position"]) & timed)
+    mine = ticks[places].astype(np.int64)
+    values: dict[str, FloatArray] = {}
+    held: dict[str, str] = {}
+    for name, own in logged.items():
+        known = np.isfinite(own) & timed
+        values[name], said = _aligned(mine, ticks[known].astype(np.int64), own[known])
+        if said:
+            held[name] = f"stands in other rows than the position and was brought onto its instants: {said}"
+    return OnClock(places, values, held)
+
+
+def _aligned(wanted: NDArray[np.int64], own: NDArray[np.int64], logged: FloatArray) -> tuple[FloatArray, str]:
+    """A signal at other instants [ns], and what is to be said of it; empty where nothing is."""
+    aligned = align(wanted, own, logged)
+    if aligned.together:
+        return aligned.values, ""
+    period = float(np.median(np.diff(wanted))) * 1e-9 if wanted.size > 1 else 0.0
+    samples = f", {aligned.longest_hold / period:.3g} position samples" if period > 0.0 else ""
+    return aligned.values, f"its last value was held for up to {aligned.longest_hold:.4g} s{samples}"
 
 
 def _size(table: CsvTable, clock: int) -> int:

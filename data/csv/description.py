@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from data.began import since_1970
 from data.clocks import ClockReport, clock_report
 from data.columns import value_range
 from data.csv.clocks import time_columns
@@ -100,6 +101,6 @@ def _clock(table: CsvTable, times: Sequence[int]) -> tuple[ClockReport | None, s
         stamps = table.values[k] * factor
         seconds = elapsed(table, k) * factor
         known = np.isfinite(stamps)
-        first = float(stamps[known][0]) if known.any() else 0.0
+        first = since_1970(float(stamps[known][0]), _unit(table, k)) if known.any() else 0.0
         return clock_report(seconds[known], start=first), table.layout.headers[k]
     return None, None

@@ -32,6 +32,7 @@ _TYPED: Final = 50  # rows by which a column is one of numbers or of words
 _COMMENTS: Final = ("#", "%", "//")
 _DELIMITERS: Final = (",", ";", "\t", "whitespace")
 _FILETIME: Final = 17  # digits of a time that Windows counts from 1601; in ms they would be a million years
+_LEAST: Final = (0.5, 0.3)  # of a row's cells that are numbers; the rest are words, and dates
 _LIKE_A_NUMBER: Final = re.compile(r"[+-]?[.,]?\d")
 _SEPARATOR: Final = re.compile(r'"?sep=([\t ,;|:!$&*/<>?@\\^_~])"?', re.IGNORECASE)
 _NO_NUMBERS: Final = "no line of its first part looks like a row of numbers; is it a log?"
@@ -58,9 +59,10 @@ def sniff(content: bytes | ByteArray, frozen: CsvDialect | None = None) -> CsvLa
         head, whole = _head(text, size)
         if not any(line.strip() for line in head):
             raise LogError("it is empty")
-        layout = _layout(head, frozen, text.encoding)
-        if layout is not None:
-            return layout
+        for least in _LEAST:
+            layout = _layout(head, frozen, text.encoding, least=least)
+            if layout is not None:
+                return layout
         if whole:
             break
     raise LogError(_NO_NUMBERS)
@@ -75,8 +77,8 @@ def _head(text: Text, size: int) -> tuple[list[str], bool]:
     return decoded, end >= text.end
 
 
-def _layout(head: Sequence[str], frozen: CsvDialect, encoding: str) -> CsvLayout | None:
-    """The dialect of a file's first lines; None where none of them looks like numbers."""
+def _layout(head: Sequence[str], frozen: CsvDialect, encoding: str, *, least: float) -> CsvLayout | None:
+    """The dialect of a file's first lines; None where in none of them that share of the cells is numbers."""
     marks = _COMMENTS if frozen.comment is None else tuple(filter(None, (frozen.comment,)))
     quote = '"' if frozen.quote is None else frozen.quote
     top = records(head, quote=quote, marks=marks)
@@ -85,12 +87,14 @@ def _layout(head: Sequence[str], frozen: CsvDialect, encoding: str) -> CsvLayout
     comment = frozen.comment if frozen.comment is not None else _comment(head)
     floor = frozen.lines_before_numbers or _behind_labview_headers(head)
     sample = [_before(line, comment) for line in _sample(top, floor, marks)]
-    shape = _shape(sample, delimiter, frozen.decimal, quote)
+    shape = _shape(sample, delimiter, frozen.decimal, quote, least=least)
     if shape is None:
         return None
     delimiter, decimal, columns = shape
     rows = [_cells(record.text, comment, delimiter, quote, columns=columns) for record in top]
-    first = _first_row(top, rows, columns=columns, decimal=decimal, frozen=frozen, marks=marks, floor=floor)
+    first = _first_row(
+        top, rows, columns=columns, decimal=decimal, frozen=frozen, marks=marks, floor=floor, least=least
+    )
     if first is None:
         return None
     if frozen.lines_before_numbers is None:
@@ -178,7 +182,7 @@ def _sample(top: Sequence[Record], floor: int, marks: tuple[str, ...]) -> list[s
 
 
 def _shape(
-    sample: Sequence[str], frozen: str | None, sign: Decimal | None, quote: str
+    sample: Sequence[str], frozen: str | None, sign: Decimal | None, quote: str, *, least: float
 ) -> tuple[str, Decimal, int] | None:
     """Delimiter, decimal sign and number of columns under which the lines look most like numbers."""
     best: tuple[float, int, float] = (0.0, 0, 0.0)
@@ -191,7 +195,7 @@ def _shape(
             if decimal == delimiter and not quoted:
                 continue
             shares = [numeric_share(row, decimal) for row in split_rows]
-            numeric = [k for k, share in enumerate(shares) if share >= 0.5]
+            numeric = [k for k, share in enumerate(shares) if share >= least]
             if not numeric:
                 continue
             columns, alike = Counter(len(split_rows[k]) for k in numeric).most_common(1)[0]
@@ -212,6 +216,7 @@ def _first_row(
     frozen: CsvDialect,
     marks: tuple[str, ...],
     floor: int,
+    least: float,
 ) -> int | None:
     """Which record is the first row of numbers.
 
@@ -229,7 +234,7 @@ def _first_row(
         if len(row) == columns
         and top[k].first >= floor
         and not (marks and top[k].text.lstrip().startswith(marks))
-        and numeric_share(row, decimal) >= 0.5
+        and numeric_share(row, decimal) >= least
         and not (paired and row[0] and not is_number(row[0], decimal))
     ]
     unlike = {

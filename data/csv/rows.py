@@ -29,7 +29,10 @@ from data.integrity import Loss
 from data.names import shown
 
 _MOST_LOSSES: Final = 1000  # rows, after which the file is no table
-_Verdict = tuple[str, str]  # what to do with a line, and why: keep, blank, comment, hidden, empty, lost
+_MOST_NAMED: Final = 8  # lines
+_Verdict = tuple[
+    str, str
+]  # what to do with a line, and why: keep, blank, comment, hidden, empty, names, lost
 
 
 @dataclass(frozen=True)
@@ -105,6 +108,13 @@ def whole_rows(text: Text, layout: CsvLayout, found: Tally) -> Iterator[Block]:
     found.notes += notes
     if walk.hidden:
         found.notes.append(f"{walk.hidden} rows of numbers are commented out and were not read")
+    if walk.named:
+        where = ", ".join(map(str, walk.named[:_MOST_NAMED]))
+        more = " and others" if len(walk.named) > _MOST_NAMED else ""
+        found.notes.append(
+            f"the names stand again in line {where}{more}: recordings were joined there, and the run is "
+            "taken apart"
+        )
     if walk.empty:
         found.notes.append(f"{walk.empty} rows hold no cell and were left out")
     if text.end < text.content.size and text.content.size - text.end > text.width - 1:
@@ -135,6 +145,11 @@ def _top(text: Text, layout: CsvLayout) -> tuple[int, int]:
     return byte, number
 
 
+def _plain(name: str) -> str:
+    """A name as the layout has it."""
+    return " ".join(name.split())
+
+
 @dataclass
 class _Walk:
     """Takes blocks apart, one after the other."""
@@ -145,6 +160,7 @@ class _Walk:
     place: _Place
     hidden: int = 0
     empty: int = 0
+    named: list[int] = field(default_factory=list)  # lines, counted from 1, that repeat the names
 
     def take(self, content: bytes, *, past: int, last: bool) -> Block | None:
         """The rows of a block; None when a quoted cell goes on behind it."""
@@ -169,6 +185,8 @@ class _Walk:
             return None
         begins, stops = line_bounds(content)
         body = np.frombuffer(content, np.uint8)
+        if self._may_name(body, begins + 1).any():
+            return None
         quotes = body == ord(layout.quote)
         outside = np.cumsum(quotes, dtype=np.uint8) & 1 == 0  # wraps at an even number
         mark = (body == ord(layout.delimiter)) & outside
@@ -223,6 +241,7 @@ class _Walk:
             usual = layout.columns - 1
         odd = np.add.reduceat(mark, begins, dtype=np.int32) != usual
         odd |= stops - begins <= usual + 2  # only delimiters
+        odd |= self._may_name(body, begins)
         if layout.columns == 1:
             odd |= np.isin(body[begins], [ord(sign) for sign in BLANKS])
         for sign in (layout.comment, "\0"):
@@ -230,6 +249,13 @@ class _Walk:
                 at = [match.start() for match in re.finditer(re.escape(sign.encode()), content)]
                 odd[np.searchsorted(begins, at, side="right") - 1] = True
         return np.asarray(odd, np.bool_)
+
+    def _may_name(self, body: NDArray[np.uint8], begins: NDArray[np.intp]) -> NDArray[np.bool_]:
+        """Lines (n,) that begin as the row of names does, if no number can."""
+        first = self.layout.headers[0][:1] if self.layout.headers else ""
+        if not first.isascii() or not first.isalpha():
+            return np.zeros(begins.size, np.bool_)
+        return np.asarray(body[np.minimum(begins, body.size - 1)] == ord(first), np.bool_)
 
     def _quoted(self, content: bytes, *, past: int, last: bool) -> Block | None:
         quote = self.layout.quote
@@ -309,7 +335,10 @@ class _Walk:
             if layout.quote and line.count(layout.quote) % 2:
                 why = "a quotation mark in it is never closed, or stands inside a cell"
             return "lost", f"line {number + 1} has {len(cells)} cells, the others {layout.columns}; {why}"
-        return ("keep", "") if any(cells) else ("empty", "")
+        if not any(cells):
+            return "empty", ""
+        repeats = layout.headers and all(map(str.__eq__, map(_plain, cells), map(_plain, layout.headers)))
+        return ("names", str(number + 1)) if repeats else ("keep", "")
 
     def _comment(self, cells: list[str], number: int) -> _Verdict:
         """What a comment hides."""
@@ -325,8 +354,10 @@ class _Walk:
 
     def _left_out(self, do: str, why: str, content: bytes, begin: int, end: int, *, before: int) -> None:
         """Note a line that is no row, before which `before` rows were kept."""
-        if do in {"hidden", "empty", "lost"}:
+        if do in {"hidden", "empty", "lost", "names"}:
             self.found.missing_before.append(before)
+        if do == "names":
+            self.named.append(int(why))
         self.hidden += do == "hidden"
         self.empty += do == "empty"
         if do != "lost":

@@ -44,7 +44,7 @@ def read_csv_log(door: Door, content: ByteArray) -> Logged:
         said = str(error)
         raise LogError(said if said.startswith(door.log) else f"{door.log}: {said}") from error
     name = f"column {shown(layout.headers[column] if layout.headers else str(column))!r}"
-    stamps = door.convert("time", interval(time), table.values[column][: read.rows])
+    stamps = door.convert("time", interval(time), table.values[column][read.places])
     require_sane_clock(door, stamps)
     lead = unset_lead(stamps)
     held = tuple(
@@ -52,8 +52,10 @@ def read_csv_log(door: Door, content: ByteArray) -> Logged:
         for quantity, text in read.held.items()
     )
     begin = since_1970(float(stamps[lead]), time.unit) if stamps.size > lead else 0.0
+    places = read.places[lead:]
+    first = int(places[0]) if places.size else 0
     logged = Logged(
-        time=door.convert("time", interval(time), elapsed(table, column, begin=lead)[: read.rows - lead]),
+        time=door.convert("time", interval(time), elapsed(table, column, begin=first)[places - first]),
         signals={
             quantity: door.convert(quantity, signal, read.values[quantity][lead:])
             for quantity, signal in wanted.items()
@@ -62,7 +64,7 @@ def read_csv_log(door: Door, content: ByteArray) -> Logged:
         metadata=layout.metadata,
         findings=(*findings, *held, *unset(door, lead, name)),
         begun=began(begin, layout.metadata),
-        breaks=tuple(place - lead for place in table.rows.breaks if lead < place < read.rows),
+        breaks=tuple(k for k in np.searchsorted(places, table.rows.breaks).tolist() if 0 < k < places.size),
     )
     return after_first(logged) if held else logged
 

@@ -93,9 +93,9 @@ def _group(said: Struct) -> RowGroup:
 
 
 def _pages(said: Struct) -> ColumnPages:
-    """Of a column's metadata: a dictionary's page, where there is one, stands before the others."""
+    """Of a column's metadata: a dictionary's page, where there is one, stands before the others, if any."""
     begin, dictionary = _integer(said.get(9)), said.get(11)
-    if isinstance(dictionary, int) and 0 < dictionary < begin:
+    if isinstance(dictionary, int) and dictionary > 0 and (begin == 0 or dictionary < begin):
         begin = dictionary
     path = tuple(part.decode(errors="replace") for part in _list(said.get(3)) if isinstance(part, bytes))
     return ColumnPages(path, begin, _integer(said.get(7)))

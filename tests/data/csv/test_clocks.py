@@ -122,6 +122,31 @@ def test_a_clock_with_holes_is_refused(tmp_path: Path) -> None:
         read(path)
 
 
+def sparse(*, shift: int = 1) -> str:
+    """As PlotJuggler writes two topics: a row for every instant of either."""
+    torques = zip((TIME[::shift] + 2e-4).tolist(), TORQUE[::shift].tolist(), strict=True)
+    rows = [(time, f"{time},{q},,") for time, q in zip(TIME.tolist(), POSITION.tolist(), strict=True)]
+    rows += [(time, f"{time},,{u},") for time, u in torques]
+    rows += [(time, f"{time},,,1") for time in (TIME[::3] + 3e-4).tolist()]
+    return "__time,q,u,other\n" + "\n".join(row for _, row in sorted(rows)) + "\n"
+
+
+def test_topics_in_rows_of_their_own_are_brought_together(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(sparse())
+    got = read(path)
+    assert np.allclose(got.time, TIME, atol=1e-12)
+    assert np.array_equal(got.position, POSITION)
+    assert np.array_equal(got.torque, TORQUE)
+    assert not got.findings
+    path.write_text(sparse(shift=5))
+    got = read(path)
+    assert np.array_equal(got.torque, TORQUE[np.maximum(np.arange(1, TIME.size) - 1, 0) // 5 * 5])
+    assert "stands in other rows than the position" in next(
+        f.text for f in got.findings if f.code == "E-CLOCK"
+    )
+
+
 def test_columns_of_times_govern_those_to_their_right() -> None:
     layout = sniff(b"n,time,q,u,Time,i\n0,0,1,2,0,3\n1,1,1,2,0,3\n")
     assert [governing(layout, k) for k in (2, 3, 5)] == [1, 1, 4]

@@ -261,6 +261,44 @@ def test_a_huge_cell_of_words_harms_no_number() -> None:
     assert read_csv(content, sniff(content), [0, 1]).values[1].tolist() == [2, 4, 6]
 
 
+@pytest.mark.parametrize("quote", ["", '"'])
+def test_names_that_stand_again_take_the_run_apart(quote: str) -> None:
+    def line(*cells: object) -> str:
+        return ",".join(f"{quote}{cell}{quote}" for cell in cells) + "\n"
+
+    head = line("time", "q", "tau")
+    rows = [line(k, 2 * k, -k) for k in range(3000)]
+    content = (head + "".join(rows[:1000]) + head + "".join(rows[1000:]) + head).encode()
+    found = read_csv(content, sniff(content), [0, 1, 2])
+    assert np.array_equal(found.values[1], 2.0 * np.arange(3000))
+    assert found.rows.breaks == (1000,)
+    assert found.rows.losses == ()
+    assert "the names stand again in line 1002, 3003: recordings were joined" in found.rows.notes[0]
+
+
+@pytest.mark.parametrize(("delimiter", "sign"), [("\t", ","), (";", ","), (";", ".")])
+def test_thousands_are_no_decimals(delimiter: str, sign: str) -> None:
+    def written(value: int) -> str:
+        return f"{value:,}".replace(",", sign)
+
+    rows = "".join(f"{k}{delimiter}{written(k + 980)}{delimiter}7\n" for k in range(300))
+    content = f"t{delimiter}q{delimiter}u\n{rows}".encode()
+    with pytest.raises(LogError, match=f"'1\\{sign}000' in row 21 .* may part thousands"):
+        read_csv(content, sniff(content), [1])
+    trimmed = "".join(f"{k}{delimiter}{str(k / 8).replace('.', sign)}\n" for k in range(8, 300))
+    exact = f"t{delimiter}q\n{trimmed}".replace(f"{sign}0\n", "\n").encode()
+    assert read_csv(exact, sniff(exact), [1]).values[1].tolist() == [k / 8 for k in range(8, 300)]
+
+
+def test_words_and_dates_beside_few_numbers() -> None:
+    content = b"Date,Time,Status,q,u\n" + b"".join(
+        b"2026-05-01,12:00:00.%03d,RUN,%d.5,-%d.5\n" % (k, k, k) for k in range(100)
+    )
+    found = read_csv(content, sniff(content), [1, 3, 4], clocks=[1])
+    assert np.allclose(found.values[1], 43_200 + 1e-3 * np.arange(100))
+    assert found.values[4].tolist() == [-k - 0.5 for k in range(100)]
+
+
 def test_line_ends_in_quoted_words() -> None:
     for end in ("\n", "\r\n"):
         rows = "".join(f'{k},{2 * k},"first{end}second, ""{k}"""{end}' for k in range(5000))

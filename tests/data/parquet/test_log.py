@@ -163,6 +163,18 @@ def test_a_damaged_row_group_is_lost_and_the_others_stand(tmp_path: Path) -> Non
     assert set(got.position.tolist()) <= set(POSITION[np.r_[:1000, 2000:3000]].tolist())
 
 
+def test_a_row_group_of_no_rows_is_none() -> None:
+    table = pa.table({"t": TIME, "q": TIME})
+    sink = BytesIO()
+    with pq.ParquetWriter(sink, table.schema) as writer:
+        for part in (table[:0], table[:1000], table[:0], table[1000:]):
+            writer.write_table(part)
+    log = opened(sink.getvalue())
+    assert np.array_equal(column(log, "q"), TIME)
+    assert log.read([0]).integrity.whole
+    assert column(opened(written({"t": TIME[:0]})), "t").size == 0
+
+
 def test_a_footer_that_lies_is_refused() -> None:
     content = written({"q": POSITION}, write_page_checksum=True)
     with pytest.raises(LogError, match="stops before its footer"):
