@@ -28,13 +28,17 @@ _PLAIN: Final = (*TIME_NAMES, "datetime", "x_value", "zeit")  # pandas', LabVIEW
 
 
 def time_columns(layout: CsvLayout) -> tuple[int, ...]:
-    """The columns that are plainly the time: the first, and those that are called as it is.
+    """The columns that are plainly the time: that before the first signals, and those that are called as it.
 
-    Only tables whose columns have clocks of their own give several the same name.
+    Only tables whose columns have clocks of their own give several the same name. Of several times side by
+    side, a date and the seconds since, the last counts.
     """
     plain = [k for k, header in enumerate(layout.headers) if is_time(header, _PLAIN) and _may_be(layout, k)]
-    names = [bare(layout.headers[k]).lower() for k in plain]
-    return tuple(k for k, name in zip(plain, names, strict=True) if name == names[0])
+    if not plain:
+        return ()
+    own = next(k for k in plain if k + 1 not in plain)
+    name = bare(layout.headers[own]).lower()
+    return tuple(k for k in plain if bare(layout.headers[k]).lower() == name)
 
 
 def _may_be(layout: CsvLayout, column: int) -> bool:

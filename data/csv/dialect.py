@@ -163,6 +163,11 @@ def _cells(line: str, comment: str, delimiter: str, quote: str, *, columns: int)
 def _behind_labview_headers(head: Sequence[str]) -> int:
     """Lines to the end of LabVIEW's second header, which closes with the same words as the first."""
     ends = [k for k, line in enumerate(head) if line.startswith(LABVIEW_END)]
+    if len(ends) > 2:
+        raise LogError(
+            f"a LabVIEW file of several segments: another header ends in line {ends[2] + 1}, and its rows "
+            "may have other columns. Save each segment as a file"
+        )
     return ends[min(1, len(ends) - 1)] + 1 if ends else 0
 
 
@@ -240,7 +245,7 @@ def _first_row(
     unlike = {
         k: words
         for place, k in enumerate(alike[:_SAMPLE])
-        if (words := _words(rows[k], [rows[other] for other in alike[place + 1 :][:_TYPED]], decimal))
+        if (words := _words(rows[k], [rows[other] for other in alike[place + 1 :][-_TYPED:]], decimal))
     }
     first = next((k for k in alike if k not in unlike), None)
     above = [k for k in unlike if first is None or k < first]

@@ -8,6 +8,7 @@ which is written last, a file tells nothing of itself.
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property, partial
 from itertools import chain
@@ -54,7 +55,10 @@ class ParquetLog:
         rows = self._footer.rows
         if rows > max(_FEW_ROWS, _MOST_ROWS_A_BYTE * content.size):
             raise LogError(f"its footer claims {rows} rows in {content.size} bytes: no log has")
-        self.columns: tuple[Column, ...] = tuple(_column(field, rows) for field in self._schema)
+        names = Counter(field.name for field in self._schema)
+        self.columns: tuple[Column, ...] = tuple(
+            _column(field, rows, alone=names[field.name] == 1) for field in self._schema
+        )
 
     def _open(self) -> pq.ParquetFile:
         return pq.ParquetFile(
@@ -193,8 +197,10 @@ def _guarded(act: Callable[[], Result], what: str) -> Result:
         raise LogError(f"{what} ({shown(str(error).strip() or type(error).__name__)})") from error
 
 
-def _column(field: pa.Field, rows: int) -> Column:
+def _column(field: pa.Field, rows: int, *, alone: bool) -> Column:
     name = field.name
+    if not alone:
+        return Column(name, rows, refused="one of several columns of that name; rename them")
     if _ticks(field.type) is not None:
         return Column(name, rows, unit="s")
     said = {key.lower(): value for key, value in (field.metadata or {}).items()}

@@ -150,6 +150,8 @@ def test_topics_in_rows_of_their_own_are_brought_together(tmp_path: Path) -> Non
 def test_columns_of_times_govern_those_to_their_right() -> None:
     layout = sniff(b"n,time,q,u,Time,i\n0,0,1,2,0,3\n1,1,1,2,0,3\n")
     assert [governing(layout, k) for k in (2, 3, 5)] == [1, 1, 4]
+    beside = sniff(b"timestamp,time,q,u\n0,0,1,2\n1,1,1,2\n")
+    assert {governing(beside, k) for k in (2, 3)} == {1}  # a date, and the seconds since
     for names in (b"t,T,q,u", b"time,q,timestamp,u", b"time,q,T [degC],u", b"t,q,time [rad],u"):
         layout = sniff(names + b"\n0,0,1,2\n1,1,1,2\n")
         assert {governing(layout, k) for k in range(1, 4)} == {0}  # times of other names are no other clocks

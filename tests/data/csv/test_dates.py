@@ -152,8 +152,15 @@ def test_a_date_elsewhere_says_what_to_do(tmp_path: Path) -> None:
 def test_a_clock_that_turns_to_numbers_is_refused(tmp_path: Path) -> None:
     cells = moments()
     cells[2000:] = [f"{value:.3f}" for value in TIME[2000:].tolist()]
-    with pytest.raises(LogError, match=r"holds '8\.000' in row 2001 of the numbers: no date, as the others"):
-        read(log(tmp_path / "run.csv", cells))
+    path = log(tmp_path / "run.csv", cells)
+    with pytest.raises(
+        LogError, match="line 2 holds '2026-05-01 12:00:00.000000' where the rows below it hold"
+    ):
+        read(path)
+    cells[1000:] = [f"{value:.3f}" for value in TIME[1000:2900].tolist()] + cells[:100]
+    path = log(tmp_path / "mixed.csv", cells)
+    with pytest.raises(LogError, match=r"holds '4\.000' in row 1001 of the numbers: no date, as the others"):
+        read(path)
 
 
 @pytest.mark.parametrize("cell", ["00:05", "12:00:00:123", "20260501T120000", "01.05.26 12:00:00"])

@@ -51,6 +51,22 @@ def test_labview_s_units_are_those_of_its_channels() -> None:
     assert (layout.headers, layout.units) == (("X_Value", "q", "u"), (None, "deg", "N m"))
 
 
+def test_labview_s_segments_are_refused_by_name() -> None:
+    head = "LabVIEW Measurement\nSeparator\tTab\n***End_of_Header***\n"
+    segment = "Channels\t1\n***End_of_Header***\nX_Value\tq\n" + "".join(f"{k}\t{-k}\n" for k in range(30))
+    assert sniff((head + segment).encode()).headers == ("X_Value", "q")
+    with pytest.raises(LogError, match="several segments: another header ends in line 38"):
+        sniff((head + segment + segment).encode())
+
+
+def test_a_preamble_of_words_and_numbers_is_no_row() -> None:
+    preamble = "Model,DPO4054\nHorizontal Units,S,\nSample Interval,1e-3,\nAttenuation,1,1\nLabel,,\n"
+    rows = "".join(f"{k},{k + 0.5},{-k}\n" for k in range(300))
+    layout = sniff((preamble + "TIME,CH1,CH2\n" + rows).encode())
+    assert (layout.headers, layout.first_row) == (("TIME", "CH1", "CH2"), 6)
+    assert layout.metadata["Sample Interval"] == "1e-3"
+
+
 @pytest.mark.parametrize("names", ["t,q,u,T\n", "\n", "\nsecond part\nt,q,u,T\n"])
 def test_a_table_above_the_table_is_not_lost_unseen(names: str) -> None:
     above = "t,q,u\n" + "".join(f"{k},{k + 0.5},{-k}\n" for k in range(3))

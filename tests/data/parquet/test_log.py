@@ -175,6 +175,16 @@ def test_a_row_group_of_no_rows_is_none() -> None:
     assert column(opened(written({"t": TIME[:0]})), "t").size == 0
 
 
+def test_two_columns_of_one_name_are_told_and_the_others_stand() -> None:
+    sink = BytesIO()
+    pq.write_table(pa.table([TIME, TIME, POSITION], names=["t", "q", "q"]), sink)
+    log = opened(sink.getvalue())
+    assert np.array_equal(column(log, "t"), TIME)
+    assert "one of several columns of that name" in str(log.columns[1].refused)
+    with pytest.raises(LogError, match="2 columns are called 'q'"):
+        column(log, "q")
+
+
 def test_a_footer_that_lies_is_refused() -> None:
     content = written({"q": POSITION}, write_page_checksum=True)
     with pytest.raises(LogError, match="stops before its footer"):
