@@ -154,7 +154,7 @@ def test_a_clock_that_turns_to_numbers_is_refused(tmp_path: Path) -> None:
     cells[2000:] = [f"{value:.3f}" for value in TIME[2000:].tolist()]
     path = log(tmp_path / "run.csv", cells)
     with pytest.raises(
-        LogError, match="line 2 holds '2026-05-01 12:00:00.000000' where the rows below it hold"
+        LogError, match=r"line 2 holds '2026-05-01 12:00:00.000000' where the rows below it hold"
     ):
         read(path)
     cells[1000:] = [f"{value:.3f}" for value in TIME[1000:2900].tolist()] + cells[:100]
