@@ -55,6 +55,12 @@ class Layout:
         return self.template.size
 
     @cached_property
+    def stamp(self) -> tuple[Place, ...]:
+        """Where a message's own seconds and nanoseconds stand, if it has any that are integers."""
+        own = stamp_places(self) or ()
+        return own if all("f" not in part.kind for part in own) else ()
+
+    @cached_property
     def proof(self) -> NDArray[np.uint64]:
         """The words of eight bytes in which anything is fixed: offset, bits and mask (w, 3)."""
         offsets = np.append(np.arange(0, self.size - _WORD, _WORD), self.size - _WORD)
@@ -139,8 +145,7 @@ def take(
     compiled
         Whether by compiled code, which takes long to load.
     """
-    own = stamp_places(layout) or ()
-    own = own if all("f" not in part.kind for part in own) else ()
+    own = layout.stamp
     if compiled and layout.size >= _WORD:
         from data.mcap import scan  # noqa: PLC0415  # see `records.tile`
 

@@ -36,8 +36,9 @@ class LayoutReader:
                     break
                 self._layouts.append(known)
             layout, places = self._layouts[tried]
-            take(layout, places, block, (begin, length), taken, compiled=self._compiled)
             tried += 1
+            if np.any(length == layout.size):
+                take(layout, places, block, (begin, length), taken, compiled=self._compiled)
         return taken
 
     def _known(self, raw: bytes) -> tuple[Layout, list[Place]] | None:
