@@ -29,6 +29,7 @@ _WINDOW_CAP: Final = 32 << 20  # bytes that zstd may keep behind
 _FIXED: Final = struct.Struct("<QQQII")  # first and last log time, unpacked size, checksum, length of a name
 _SIZE: Final = struct.Struct("<Q")
 _LONGEST_NAME: Final = 64
+_EMPTY: Final = 64  # [bytes] that nothing may pack to
 _PIECE: Final = 4 << 20  # bytes that lz4 gives at once
 _MAGIC: Final = {"zstd": b"\x28\xb5\x2f\xfd", "lz4": b"\x04\x22\x4d\x18", "": b""}
 
@@ -49,6 +50,8 @@ class ChunkHead:
     def credible(self) -> bool:
         """Whether times, compression and sizes agree with each other."""
         first, last = self.time_range
+        if self.unpacked_size == 0 and self.end - self.begin > _EMPTY:
+            return False
         if first > last or last >= 1 << 63 or self.compression not in _MAGIC:
             return False
         return self.compression != "" or self.end - self.begin == self.unpacked_size
@@ -167,4 +170,6 @@ def _unlz4(packed: ByteArray, limit: int) -> ByteArray:
         if found == limit or machine.eof:
             break
         piece = machine.decompress(b"", max_length=min(limit - found, _PIECE))
+    if machine.unused_data:
+        raise ValueError(f"{len(machine.unused_data)} bytes stand behind its end")
     return block[:found]

@@ -21,11 +21,14 @@ from mcap_ros2.decoder import DecoderFactory
 from data.findings import LogError
 from data.mcap import ros1, ros_layout
 from data.mcap.layout_reader import Recognise
+from data.mcap.ros_bounds import require_bounds
 from data.mcap.ros_definitions import Dialect, Field, parse_definition
 from data.names import shown
 
 Decode = Callable[[bytes], object]
 _DIALECTS: Final[dict[str, Dialect]] = {"cdr": "ros2", "ros1": "ros1"}
+_CDR: Final = (b"\0\0", b"\0\1")  # big- and little-endian
+_LONGEST_JSON: Final = 4 << 20  # [bytes]
 _READ: Final = "cdr with ros2msg, ros1 with ros1msg, protobuf, or json"
 
 
@@ -40,11 +43,12 @@ def decoder(channel: Channel, schema: Schema | None, *, exact: bool = False) -> 
     topic, encoding = shown(channel.topic), channel.message_encoding
     if encoding == "json":
         loads = partial(json.loads, parse_float=Decimal) if exact else json.loads
-        return lambda raw: _guarded(loads, raw, topic)
+        return partial(_guarded, partial(_json, loads), topic=topic)
     kind = (encoding, schema.encoding if schema else None)
     try:
         if schema is not None and kind == ("cdr", "ros2msg"):
-            return partial(_guarded, _cdr_decoder(encoding, schema), topic=topic)
+            fields = _definition(schema, "ros2")  # within bounds, which the decoder's own parser has not
+            return partial(_guarded, partial(_cdr, fields, _cdr_decoder(encoding, schema)), topic=topic)
         if schema is not None and kind == ("ros1", "ros1msg"):
             return partial(_guarded, partial(ros1.decode, _definition(schema, "ros1")), topic=topic)
         if schema is not None and kind == ("protobuf", "protobuf"):
@@ -95,9 +99,24 @@ def _cdr_decoder(encoding: str, schema: Schema) -> Decode:
     return found
 
 
+def _cdr(fields: tuple[Field, ...], decode: Decode, raw: bytes) -> object:
+    if raw[:2] not in _CDR:
+        raise LogError(f"it is no plain CDR (representation {raw[:2].hex()}), which alone is read")
+    require_bounds(fields, raw)
+    return decode(raw)
+
+
+def _json(loads: Callable[[bytes], object], raw: bytes) -> object:
+    if len(raw) > _LONGEST_JSON:
+        raise LogError(f"JSON of more than {_LONGEST_JSON} bytes in one message")
+    return loads(raw)
+
+
 def _guarded(decode: Callable[[bytes], object], raw: bytes, topic: str) -> object:
     try:
         return decode(raw)
+    except LogError as error:
+        raise LogError(f"{topic}: a message of {len(raw)} bytes cannot be decoded: {error}") from error
     except Exception as error:  # a foreign decoder on foreign bytes may raise anything
         raise LogError(
             f"{topic}: a message of {len(raw)} bytes cannot be decoded ({_reason(error)})"

@@ -29,6 +29,9 @@ from data.mcap.walk import Block, McapWalk
 
 MOST_LISTED: Final = 500  # channels
 _MOST_FIELDS: Final = 200
+_LONGEST: Final = 200  # characters of a value
+_HUGE: Final = 1 << 1000  # integers beyond are no numbers to a program that reads JSON
+_SHOWN: Final = (int, float, str, np.integer, np.floating)
 _LARGE: Final = 256 << 20  # [bytes] of a file that is worth loading compiled code
 
 
@@ -172,12 +175,16 @@ def described_fields(message: object) -> tuple[Field, ...]:
         elements = list(value) if hasattr(value, "__iter__") else []
         names = found.get(path.rpartition(".")[0] + "." * ("." in path) + "name")
         joints = tuple(str(name) for name in names) if isinstance(names, list) and path != "name" else ()
-        first = elements[0] if elements and isinstance(elements[0], int | float | str) else None
+        first = _plain(elements[0]) if elements and isinstance(elements[0], _SHOWN) else None
         listed.append(Field(path, first, len(elements), joints if len(joints) == len(elements) else ()))
     return tuple(listed)
 
 
 def _plain(value: object) -> float | str:
+    if isinstance(value, np.integer | np.floating):
+        value = value.item()
     if isinstance(value, int | float) and not isinstance(value, bool):
-        return value
-    return str(value)
+        return value if abs(value) < _HUGE or isinstance(value, float) else str(value)[:_LONGEST]
+    if isinstance(value, bytes | bytearray):
+        return f"{len(value)} bytes"
+    return str(value)[:_LONGEST]

@@ -21,12 +21,14 @@ from data.mcap.field_path import FieldPath
 from data.mcap.json_scan import POWERS, take
 from data.mcap.layout import Layout, Leaf, Taken, place, stamp_places
 from data.mcap.records import ByteArray
-from data.mcap.stamp import LATEST
+from data.mcap.stamp import LATEST, PLACES
 
 _TOKEN: Final = re.compile(
     rb'[ \t\n\r]*(?:([\[\]{}:,])|("(?:[^"\\\x00-\x1f]|\\.)*")|(-?\d[-+.\deE]*)|(true|false|null))'
 )
 _DEEPEST: Final = 32
+_PATH_SIGNS: Final = frozenset(".[]{}")
+_STAMPS: Final = tuple(".".join(way) for way in PLACES)
 _MOST_NUMBERS: Final = 4096
 _MOST_LAYOUTS: Final = 16
 
@@ -88,6 +90,7 @@ def _shape_of(raw: bytes, paths: Sequence[FieldPath]) -> _Shape | None:
     walk = _Walk(raw)
     try:
         walk.value("", depth=0)
+        json.loads(raw)  # what it refuses is no JSON, be its structure as it may
         if raw[walk.at :].strip(b" \t\n\r"):
             return None
     except (_UnlikeError, ValueError):
@@ -99,6 +102,14 @@ def _shape_of(raw: bytes, paths: Sequence[FieldPath]) -> _Shape | None:
     if len(known) < len(paths):
         return None
     own_stamp = stamp_places(layout)
+    if own_stamp is None and any(path in walk.objects for path in _STAMPS):
+        return None
+    if (
+        own_stamp is not None
+        and _STAMPS[0] in walk.objects
+        and not any(path.startswith(f"{_STAMPS[0]}.") for path in walk.leaves)
+    ):
+        return None
     wanted = [*known, *([] if own_stamp is None else (own.offset for own in own_stamp))]
     slot, rows = np.full(len(walk.numbers), -1, np.int64), []
     for token in wanted:
@@ -126,17 +137,21 @@ class _Walk:
         self.numbers: list[tuple[int, int]] = []
         self.leaves: dict[str, Leaf] = {}
         self.texts: dict[str, tuple[str, ...]] = {}
+        self.objects: set[str] = set()
 
     def value(self, path: str, *, depth: int) -> str:
         """Pass over a value at a path; what it is: a mark, "text", "number" or "word"."""
         if depth > _DEEPEST or len(self.numbers) > _MOST_NUMBERS:
             raise _UnlikeError
         mark, _, number, word = self._next()
+        if path in _STAMPS and mark != b"{":
+            raise _UnlikeError  # a stamp that is none, or none at all
         if number is not None:
             self.leaves[path] = Leaf(len(self.numbers), "f8", 1)
             self.numbers.append((self.at - len(number), self.at))
             return "number"
         if mark == b"{":
+            self.objects.add(path)
             self._object(path, depth)
         elif mark == b"[":
             self._array(path, depth)
@@ -153,8 +168,8 @@ class _Walk:
             if text is None or self._next()[0] != b":":
                 raise _UnlikeError
             name = str(json.loads(text))
-            if name in seen:
-                raise _UnlikeError  # the last of several counts
+            if name in seen or not name or _PATH_SIGNS.intersection(name):
+                raise _UnlikeError  # the last of several counts; a path could mean another field
             seen.add(name)
             self.value(f"{path}.{name}" if path else name, depth=depth + 1)
             mark, _, _, _ = self._next()

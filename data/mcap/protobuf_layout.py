@@ -69,6 +69,9 @@ class _Walk:
             field = descriptor.fields_by_number.get(tag >> 3)
             if field is None:
                 raise _Unprovable
+            choice = field.containing_oneof
+            if choice is not None and any(own.name in seen for own in choice.fields if own is not field):
+                raise _Unprovable  # the last of several members counts
             number = seen.get(field.name, 0)
             seen[field.name] = number + 1
             self._field(field, tag & 7, prefix + field.name, number, end=end, depth=depth)

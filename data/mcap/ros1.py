@@ -17,6 +17,9 @@ _FORMATS: Final = {
 _WIDTHS: Final = {**NUMBERS, "byte": 1, "char": 1}
 
 
+MOST_ELEMENTS: Final = 100_000  # of one message that are made one by one: texts, times, messages
+
+
 def decode(fields: tuple[Field, ...], raw: bytes) -> Mapping[str, Any]:
     """A message as nested mappings; ValueError or struct.error where it contradicts its definition."""
     return _Reader(raw).message(fields)
@@ -28,6 +31,7 @@ class _Reader:
     def __init__(self, raw: bytes) -> None:
         self.raw = raw
         self.here = 0
+        self.elements = 0
 
     def message(self, fields: tuple[Field, ...]) -> dict[str, Any]:
         return {field.name: self._value(field) for field in fields}
@@ -42,7 +46,13 @@ class _Reader:
             "duration": lambda: self._instant("i"),
             "message": lambda: self.message(field.fields),
         }[field.kind]
-        return single() if field.length is None else [single() for _ in range(self._count(field.length))]
+        if field.length is None:
+            return single()
+        count = self._count(field.length)
+        self.elements += count
+        if self.elements > MOST_ELEMENTS:
+            raise ValueError(f"more than {MOST_ELEMENTS} elements that are made one by one")
+        return [single() for _ in range(count)]
 
     def _numbers(self, kind: str, length: int | None) -> Any:
         if length is None:

@@ -25,7 +25,7 @@ OTHERS: Final = frozenset({"bool", "byte", "char", "string", "wstring", "time", 
 _FIELD: Final = re.compile(r"^([\w/]+)(?:<=\d+)?(\[(<=)?(\d*)\])?\s+(\w+)\s*(=?)")
 _SEPARATOR: Final = re.compile(r"^={3,}\s*$", re.MULTILINE)
 _DEEPEST: Final = 16
-_MOST_FIELDS: Final = 4096
+_MOST_FIELDS: Final = 1024
 _MOST_TEXT: Final = 1 << 20  # characters
 
 

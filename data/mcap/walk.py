@@ -50,6 +50,8 @@ _HINTS: Final = (
     Opcode.SUMMARY_OFFSET,
 )
 _PASSED: Final = frozenset({*map(int, _HINTS), *range(16, 256)})  # not needed here, or not known
+_EMPTIEST: Final = 256  # [bytes] that a record of an empty chunk may take
+_FOOTER_LENGTH: Final = 20  # [bytes]
 _AHEAD: Final = 4 << 20  # [bytes] of a file that is worth a thread
 _SMALLEST_DISGUISED: Final = MESSAGE_PREFIX  # [bytes]
 _MOST_DISGUISED: Final = 10_000  # of a stretch that are looked through
@@ -88,6 +90,7 @@ class McapWalk:
         self._metadata_bytes = 0
         self._loose = False  # whether messages stand outside chunks
         self._chunked = False  # whether there are chunks
+        self._guarded = False  # whether any has a checksum
         self._summary_read = False
         self._suspect = -1  # the record that ends where no other follows
 
@@ -172,6 +175,8 @@ class McapWalk:
         if opcode in _PASSED:
             return None, self._pass_over(here), False
         if opcode == Opcode.FOOTER:
+            if length != _FOOTER_LENGTH:
+                raise Damage(here, f"a footer of {length} bytes")
             self._endings.footer(begin, end)
             return None, end, True
         try:
@@ -188,11 +193,14 @@ class McapWalk:
         try:
             head = read_head(content, begin, content.size)
             agree = head.end == stated
+            if head.unpacked_size == 0 and max(head.end, stated) - head.begin > _EMPTIEST:
+                raise Damage(begin, "a chunk that says it is empty is not")
             if head.end < stated and self._if_followed(head.end) is None:
                 agree = self._if_followed(stated) is not None  # with fields that are not known yet
             end = stated if agree else head.end
             if agree and head.credible:
                 resume = end
+            self._guarded |= head.credible and head.checksum != 0
             block = self._unpacking.unpack(head)
             if not agree and not head.checksum:
                 raise Damage(begin, "a chunk's two lengths differ, and no checksum tells which is right")
@@ -234,12 +242,22 @@ class McapWalk:
             tiling = Tiling(tiling.opcode[:-1], tiling.begin[:-1], tiling.length[:-1], last)
         if not tiling.opcode.size:
             return None, last
-        self._loose |= bool(np.any(tiling.opcode == Opcode.MESSAGE))
+        if np.any(tiling.opcode == Opcode.MESSAGE):
+            if self._guarded and (not self._proofs.whole or self._indexes(tiling)):
+                why = "messages stand outside chunks, where no checksum proves them"
+                raise Damage(here, why, resume=tiling.end)
+            self._loose = True
         try:
             block = self._block(content, tiling, listed, record=None, checked=False)
         except Damage as damage:
             raise Damage(here, damage.why, resume=tiling.end) from damage
         return block, tiling.end
+
+    def _indexes(self, tiling: Tiling) -> bool:
+        """Whether what stands as messages is a chunk's index, or its content."""
+        mine = np.flatnonzero(tiling.opcode == Opcode.MESSAGE)[:1]
+        begin = int(tiling.begin[mine[0]])
+        return exact(self._content, Opcode.MESSAGE_INDEX, begin, begin + int(tiling.length[mine[0]]))
 
     def _near(self) -> Surroundings:
         """What a message must be like to be believed, as far as the walk has come."""

@@ -162,7 +162,7 @@ def test_unread_encodings_and_broken_messages_are_refused_by_name(capfd: pytest.
         (
             hostile.schema(1, "p/msg/S", "ros2msg", b"what") + hostile.channel(1, 1, "/a", "cdr"),
             b"",
-            "schema cannot",
+            "is no field",
         ),
         (hostile.channel(1, 0, "/a", "json"), b"{", "cannot be decoded"),
         (
@@ -220,3 +220,72 @@ def test_what_is_no_field_path(text: str) -> None:
 
 def test_the_metadata_record_has_the_name_that_rigs_may_rely_on() -> None:
     assert METADATA_NAME == "stribeck"
+
+
+# What an ordinary decoder believes, and what the fast ways must not ----------------------------------------
+
+
+def cdr_file(definition: str, body: bytes, kind: int = 1) -> bytes:
+    """One CDR message of a representation, 1 for little-endian."""
+    schema = hostile.schema(1, "p/msg/S", "ros2msg", definition.encode())
+    message = hostile.message(1, 1, bytes((0, kind, 0, 0)) + body)
+    return hostile.file(schema, hostile.channel(1, 1, "/a", "cdr"), message)
+
+
+SEPARATOR = "=" * 80
+NESTED = f"p/E[] t\n{SEPARATOR}\nMSG: p/E\np/F f\n{SEPARATOR}\nMSG: p/F\nuint8[5] x\n"
+
+
+@pytest.mark.parametrize(
+    ("definition", "body"),
+    [
+        (NESTED, b"\xff" * 4 + bytes(100)),
+        (NESTED.replace("E[] t", "E[4000000000] t"), bytes(100)),
+        (
+            f"p/A[100000] t\n{SEPARATOR}\nMSG: p/A\np/B[100000] t\n{SEPARATOR}\nMSG: p/B\nuint8 x\n",
+            bytes(100),
+        ),
+        ("string[] t", b"\xff" * 4 + bytes(100)),
+        ("bool[4000000000] t", bytes(100)),
+        (f"p/E[] t\n{SEPARATOR}\nMSG: p/E\nuint8 x\n", struct.pack("<I", 2_000_000) + bytes(2_000_000)),
+    ],
+)
+def test_a_count_is_held_against_the_bytes_that_are_left(definition: str, body: bytes) -> None:
+    content = np.frombuffer(cdr_file(definition, body), np.uint8)
+    with pytest.raises(LogError, match="it claims"):
+        read_columns(content, [parse_path("/a:y")])
+    assert "it claims" in str(describe(content).channels[0].refused)
+
+
+def test_ros1_and_json_messages_of_millions_of_parts_are_refused() -> None:
+    schema = hostile.schema(1, "p/S", "ros1msg", b"time[] t")
+    body = struct.pack("<I", 500_000) + bytes(4_000_000)
+    for head, encoding, raw, why in (
+        (schema, "ros1", body, "more than 100000 elements"),
+        (b"", "json", b"[" + b"[]," * 1_500_000 + b"[]]", "JSON of more than"),
+    ):
+        channel = hostile.channel(1, 1 if head else 0, "/a", encoding)
+        content = np.frombuffer(hostile.file(head, channel, hostile.message(1, 1, raw)), np.uint8)
+        assert why in str(describe(content).channels[0].refused)
+
+
+@pytest.mark.parametrize("kind", [2, 3, 6, 7, 8, 9, 10, 11])
+def test_other_representations_of_cdr_are_refused_by_name(kind: int) -> None:
+    raw = cdr_file("uint32 a\nfloat64 b", struct.pack("<Id", 1, 1.5), kind)
+    with pytest.raises(LogError, match="no plain CDR"):
+        read_columns(np.frombuffer(raw, np.uint8), [parse_path("/a:b")])
+
+
+def test_values_that_are_hard_to_show_are_shown() -> None:
+    body = b'{"x": 1' + b"0" * 400 + b', "text": "' + b"y" * 5000 + b'"}'
+    content = hostile.file(hostile.channel(1, 0, "/a", "json"), hostile.message(1, 1, body))
+    fields = {
+        field.path: field.value for field in describe(np.frombuffer(content, np.uint8)).channels[0].fields
+    }
+    assert len(str(fields["x"])) <= 200
+    assert len(str(fields["text"])) <= 200
+    schema = hostile.schema(1, "p/S", "ros1msg", b"int32[] a\nuint8[] b")
+    message = hostile.message(1, 1, struct.pack("<I2iI2B", 2, 7, 8, 2, 5, 6))
+    content = hostile.file(schema, hostile.channel(1, 1, "/a", "ros1"), message)
+    first = describe(np.frombuffer(content, np.uint8)).channels[0].fields
+    assert [field.value for field in first] == [7, 5]

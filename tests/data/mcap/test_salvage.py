@@ -238,3 +238,45 @@ def test_messages_of_a_chunk_whose_head_is_gone_are_not_believed(tmp_path: Path)
     found, messages = walk(content[:place] + bytes(49) + content[place + 49 :])
     assert messages == []  # its checksum is gone too, and nothing else vouches for them
     assert found.integrity.losses[0].begin == place
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+@pytest.mark.parametrize(("first", "count"), [(9, 64), (9, 512), (25, 23)])
+def test_a_chunk_whose_head_was_zeroed_is_a_loss(
+    compression: CompressionType, first: int, count: int
+) -> None:
+    content = bytearray(peer(1000, compression=compression))
+    places = records(bytes(content), 6)
+    (length,) = struct.unpack_from("<Q", content, places[3] + 1)
+    last = min(places[3] + first + count, places[3] + 9 + length)
+    content[places[3] + first : last] = bytes(last - places[3] - first)
+    found, messages = walk(bytes(content))
+    assert found.integrity.losses[0].begin <= places[3] + 9 < found.integrity.losses[0].end
+    bodies = [struct.pack("<Q", time) for _, time, _ in messages]
+    assert len(set(bodies)) == len(bodies) < 1000
+    assert found.integrity.chunks == len(places) - 1
+
+
+def test_an_index_whose_opcode_was_flipped_is_no_message() -> None:
+    content = bytearray(peer(400))
+    for place in records(bytes(content), 7)[2::3]:
+        content[place] = 5
+    found, messages = walk(bytes(content))
+    assert [time for _, time, _ in messages] == [BEGIN + k * STEP for k in range(400)]
+    assert "messages stand outside chunks" in found.integrity.losses[0].why
+
+
+@pytest.mark.parametrize("bit", range(8))
+def test_a_false_length_of_lz4_data_costs_that_chunk_alone(bit: int) -> None:
+    content = bytearray(peer(1000, compression=CompressionType.LZ4))
+    place = records(bytes(content), 6)[2]
+    content[place + 9 + 32 + 3 + 1] ^= 1 << bit  # the second byte of the length of its data
+    found, _ = walk(bytes(content))
+    assert found.integrity.chunks == len(records(peer(1000, compression=CompressionType.LZ4), 6)) - 1
+
+
+def test_a_chunk_that_passes_for_a_footer_ends_nothing() -> None:
+    content = bytearray(peer(1000))
+    places = records(bytes(content), 6)
+    content[places[1]] = 2
+    assert walk(bytes(content))[0].integrity.chunks == len(places) - 1
