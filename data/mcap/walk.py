@@ -39,7 +39,7 @@ from data.mcap.limits import (
 )
 from data.mcap.proofs import Proofs
 from data.mcap.readable import BLOCK_OPCODES, Dropped, readable, refused
-from data.mcap.records import HEADER, MESSAGE_PREFIX, ByteArray, Damage, Messages, Tiling, look, tile
+from data.mcap.records import HEADER, MESSAGE_PREFIX, ByteArray, Damage, Messages, Tiling, gather, look, tile
 from data.mcap.resync import Seeker, disguised, exact, summary_declarations
 
 _HINTS: Final = (
@@ -49,7 +49,9 @@ _HINTS: Final = (
     Opcode.METADATA_INDEX,
     Opcode.SUMMARY_OFFSET,
 )
-_PASSED: Final = frozenset({*map(int, _HINTS), *range(16, 256)})  # not needed here, or not known
+_INDEX_HEAD: Final = 6  # [bytes] channel and size
+_UNKNOWN: Final = 16  # opcodes from here on mean nothing yet
+_PASSED: Final = frozenset({*map(int, _HINTS), *range(_UNKNOWN, 256)})  # not needed here, or not known
 _EMPTIEST: Final = 256  # [bytes] that a record of an empty chunk may take
 _FOOTER_LENGTH: Final = 20  # [bytes]
 _AHEAD: Final = 4 << 20  # [bytes] of a file that is worth a thread
@@ -291,6 +293,15 @@ class McapWalk:
         """Pass over indexes, and records of unknown opcodes; where to go on."""
         content = self._content
         tiling = tile(content, begin=here, within=_PASSED, compiled=self.compiled)
+        false = _false_index(content, tiling)
+        if false == 0:
+            end = int(tiling.begin[0] + tiling.length[0])
+            known = end < content.size and int(content[end]) < _UNKNOWN
+            why = "an index of messages whose lengths do not add up"
+            raise Damage(here, why, resume=self._if_followed(end) if known else None)
+        if false is not None:
+            end = int(tiling.begin[false]) - HEADER.size
+            tiling = Tiling(tiling.opcode[:false], tiling.begin[:false], tiling.length[:false], end)
         near = self._near()
         starts = tiling.begin - HEADER.size
         large = np.flatnonzero(tiling.length >= _SMALLEST_DISGUISED)[:_MOST_DISGUISED]
@@ -359,6 +370,16 @@ class McapWalk:
         end = self._content.size if after is None else after
         self._proofs.lose(here, end, damage.why, time_range=head.time_range if head else None)
         return end
+
+
+def _false_index(content: ByteArray, tiling: Tiling) -> int | None:
+    """The first index of messages that is shorter than it says, or longer with no known record behind it."""
+    mine = np.flatnonzero((tiling.opcode == Opcode.MESSAGE_INDEX) & (tiling.length >= _INDEX_HEAD))
+    size = gather(content, tiling.begin[mine] + 2, 4).copy().view("<u4").reshape(-1)
+    more = tiling.length[mine] - _INDEX_HEAD - size.astype(np.int64)
+    behind = content[np.minimum(tiling.begin[mine] + tiling.length[mine], content.size - 1)]
+    false = mine[(more < 0) | ((more > 0) & ((behind >= _UNKNOWN) | (behind == 0)))]
+    return int(false[0]) if false.size else None
 
 
 def _loss(one: Dropped, record: tuple[int, int] | None) -> Loss:

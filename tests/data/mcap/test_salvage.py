@@ -280,3 +280,13 @@ def test_a_chunk_that_passes_for_a_footer_ends_nothing() -> None:
     places = records(bytes(content), 6)
     content[places[1]] = 2
     assert walk(bytes(content))[0].integrity.chunks == len(places) - 1
+
+
+@pytest.mark.parametrize("bit", range(12))
+def test_an_index_of_a_false_length_costs_no_chunk(bit: int) -> None:
+    content = bytearray(peer(1000))
+    place = records(bytes(content), 7)[2]
+    content[place + 1 + bit // 8] ^= 1 << bit % 8
+    found, messages = walk(bytes(content))
+    assert len(messages) == 1000
+    assert found.integrity.losses
