@@ -245,7 +245,10 @@ class McapWalk:
         if not tiling.opcode.size:
             return None, last
         if np.any(tiling.opcode == Opcode.MESSAGE):
-            if self._guarded and (not self._proofs.whole or self._indexes(tiling)):
+            if self._guarded and self._indexes(tiling):
+                why = "an index stands there as a message"
+                raise Damage(here, why, resume=tiling.end)
+            if not self._proofs.whole and (self._guarded or (not self._loose and self._in_chunks())):
                 why = "messages stand outside chunks, where no checksum proves them"
                 raise Damage(here, why, resume=tiling.end)
             self._loose = True
@@ -255,8 +258,12 @@ class McapWalk:
             raise Damage(here, damage.why, resume=tiling.end) from damage
         return block, tiling.end
 
+    def _in_chunks(self) -> bool:
+        """Whether there is a chunk anywhere, or an index of one."""
+        return self._chunked or self._seeker.chunked()
+
     def _indexes(self, tiling: Tiling) -> bool:
-        """Whether what stands as messages is a chunk's index, or its content."""
+        """Whether what stands as the first message is a chunk's index."""
         mine = np.flatnonzero(tiling.opcode == Opcode.MESSAGE)[:1]
         begin = int(tiling.begin[mine[0]])
         return exact(self._content, Opcode.MESSAGE_INDEX, begin, begin + int(tiling.length[mine[0]]))
@@ -365,7 +372,7 @@ class McapWalk:
         after = damage.resume
         if after is None:
             self._read_summary()
-            loose = self._loose or not (self._chunked or self._seeker.chunked())
+            loose = self._loose or not self._in_chunks()
             after = self._seeker.next_record(here + 1, self._near(), loose=loose)
         end = self._content.size if after is None else after
         self._proofs.lose(here, end, damage.why, time_range=head.time_range if head else None)

@@ -263,7 +263,7 @@ def test_an_index_whose_opcode_was_flipped_is_no_message() -> None:
         content[place] = 5
     found, messages = walk(bytes(content))
     assert [time for _, time, _ in messages] == [BEGIN + k * STEP for k in range(400)]
-    assert "messages stand outside chunks" in found.integrity.losses[0].why
+    assert "an index stands there as a message" in found.integrity.losses[0].why
 
 
 @pytest.mark.parametrize("bit", range(8))
