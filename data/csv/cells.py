@@ -31,8 +31,6 @@ _IS_NUMBER: Final = {sign: re.compile(rule, re.ASCII) for sign, rule in _NUMBER.
 _IS_MISSING: Final = re.compile(
     r"(|[+-]?nan|#?na|#?n/a|<na>|#n/a n/a|null|none|[+-]?1[.,]#(ind|s?q?nan)0*)", re.IGNORECASE
 )
-
-
 _THOUSANDS: Final = re.compile(r"[+-]?[1-9]\d{0,2}[.,]\d{3}", re.ASCII)
 
 

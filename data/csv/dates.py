@@ -95,7 +95,7 @@ class TimeCells:
             When a cell is not of the column's kind, or there is no such day.
         """
         if self.kind is None:
-            filled = (str(cell).strip() for cell in cells.to_pylist())
+            filled = (str(cell.as_py()).strip() for cell in cells)
             first = next((cell for cell in filled if not is_missing(cell)), None)
             self.kind = None if first is None else kind_of(first)
         if self.kind is None or not self.dated:

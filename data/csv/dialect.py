@@ -179,7 +179,7 @@ def _sample(top: Sequence[Record], floor: int, marks: tuple[str, ...]) -> list[s
         if record.first >= floor
         and record.text.strip()
         and "\0" not in record.text
-        and not record.text.lstrip().startswith(marks)
+        and not record.commented(marks)
     ]
     sample = plain[-_SAMPLE:]
     cells = max((len(line) for line in sample), default=0) // 4 + 1
@@ -238,7 +238,7 @@ def _first_row(
         for k, row in enumerate(rows)
         if len(row) == columns
         and top[k].first >= floor
-        and not (marks and top[k].text.lstrip().startswith(marks))
+        and not top[k].commented(marks)
         and numeric_share(row, decimal) >= least
         and not (paired and row[0] and not is_number(row[0], decimal))
     ]
@@ -277,12 +277,11 @@ def _with_damaged(
         if not top[k].text.strip():
             continue
         filled = [cell for cell in rows[k] if cell]
-        commented = bool(marks) and top[k].text.lstrip().startswith(marks)
         numeric = len(filled) == 1 or any(is_number(cell, ".") or is_number(cell, ",") for cell in filled)
         damaged = "\0" in top[k].text or (
             bool(filled) and _LIKE_A_NUMBER.match(filled[0]) is not None and numeric
         )
-        if commented or not damaged:
+        if top[k].commented(marks) or not damaged:
             break
         start = k
     return start
@@ -298,7 +297,7 @@ def _require_no_hidden_row(
 ) -> None:
     """Refuse a first row that passes for a comment since its first cell begins like one."""
     for record, row in zip(reversed(above), reversed(rows), strict=True):
-        if not marks or not record.text.lstrip().startswith(marks):
+        if not record.commented(marks):
             return
         first = row[0].lstrip("".join(marks)).strip() if row else ""
         if len(row) == columns > 1 and numeric_share(row[1:], decimal) == 1.0 and is_missing(first) and first:
@@ -319,8 +318,8 @@ def _require_one_table(
     """Refuse rows of numbers above the names: they would pass for settings."""
     before = 0
     for record, row in zip(above, rows, strict=True):
-        commented = bool(marks) and record.text.lstrip().startswith(marks)
-        numeric = len(row) > 1 and not commented and all(row) and numeric_share(row, decimal) == 1.0
+        plain = len(row) > 1 and all(row) and not record.commented(marks)
+        numeric = plain and numeric_share(row, decimal) == 1.0
         if numeric and before == len(row):
             raise LogError(
                 f"line {record.first} and that below it are rows of {len(row)} numbers, and further down it "
@@ -333,8 +332,7 @@ def _is_row(
     record: Record, row: Sequence[str], columns: int, decimal: Decimal, marks: tuple[str, ...]
 ) -> bool:
     """Whether a record can be nothing but a row of numbers."""
-    commented = bool(marks) and record.text.lstrip().startswith(marks)
-    return len(row) == columns and not commented and numeric_share(row, decimal) == 1.0
+    return len(row) == columns and not record.commented(marks) and numeric_share(row, decimal) == 1.0
 
 
 def _words(row: Sequence[str], below: Sequence[Sequence[str]], decimal: Decimal) -> list[str]:

@@ -107,7 +107,7 @@ def read_above(
             row.append("")
         if not any(row) or record.text.startswith((LABVIEW_END, "sep=")):
             continue
-        if marks and record.text.lstrip().startswith(marks):
+        if record.commented(marks):
             names = _commented_names(record, row, columns, marks)
             fresh = not (found.units or found.names) and units_row is not False
             if names and fresh and is_units_row(names, columns):
@@ -124,7 +124,7 @@ def read_above(
                 _read_setting(found, record, row)
         elif _is_column_settings(row):
             unnamed.append(row)
-        elif found.units is None and _is_units(row, above[:k], rows[:k], columns, units_row=units_row):
+        elif found.units is None and _is_units(row, rows[:k], columns, units_row=units_row):
             _take_units(found, row, columns)
         elif _is_one_setting(row, columns) or (header is not True and _names_nothing(row)):
             _read_setting(found, record, row)
@@ -144,12 +144,7 @@ def _trimmed(row: Sequence[str], columns: int) -> list[str]:
 
 
 def _is_units(
-    row: Sequence[str],
-    above: Sequence[Record],
-    rows: Sequence[list[str]],
-    columns: int,
-    *,
-    units_row: bool | None,
+    row: Sequence[str], above: Sequence[list[str]], columns: int, *, units_row: bool | None
 ) -> bool:
     """Whether a row holds units; some words of it may be unknown here, if names stand above it."""
     if units_row is not None:
@@ -160,7 +155,7 @@ def _is_units(
     known = sum(known_unit(word) is not None for word in words)
     if len(row) != columns or known < 2 or 2 * known < len(words) or not above:
         return False
-    names = _trimmed(rows[-1], columns)
+    names = _trimmed(above[-1], columns)
     return (
         len(names) == columns
         and all(name and not is_number(name, ".") and not is_number(name, ",") for name in names)

@@ -174,7 +174,7 @@ def _columns(block: Block, layout: CsvLayout, columns: Sequence[int]) -> dict[in
 def _no_number(layout: CsvLayout, column: int, row: int, error: NotNumbersError) -> str:
     name = layout.headers[column] if layout.headers else str(column)
     cell = shown(error.cell, 40)
-    why = (error.why if error.why != NO_NUMBER else None) or no_number(error.cell)
+    why = no_number(error.cell) if error.why == NO_NUMBER else error.why
     return f"column {shown(name)!r} holds {cell!r} in row {row + 1} of the numbers: {why}"
 
 

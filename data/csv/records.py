@@ -23,6 +23,10 @@ class Record:
     past: int  # behind its last line
     text: str  # without its line end; a blank for each line end inside a cell
 
+    def commented(self, marks: tuple[str, ...]) -> bool:
+        """Whether it begins with one of the marks of a comment."""
+        return self.text.lstrip().startswith(marks)
+
 
 def records(lines: Sequence[str], *, quote: str, marks: tuple[str, ...], first: int = 0) -> list[Record]:
     """The records of lines without their ends, the first of which has the number `first`."""

@@ -30,9 +30,7 @@ from data.names import shown
 
 _MOST_LOSSES: Final = 1000  # rows, after which the file is no table
 _MOST_NAMED: Final = 8  # lines
-_Verdict = tuple[
-    str, str
-]  # what to do with a line, and why: keep, blank, comment, hidden, empty, names, lost
+_Verdict = tuple[str, str]  # what to do (keep, blank, comment, hidden, empty, names, lost), and why
 
 
 @dataclass(frozen=True)
@@ -337,7 +335,7 @@ class _Walk:
             return "lost", f"line {number + 1} has {len(cells)} cells, the others {layout.columns}; {why}"
         if not any(cells):
             return "empty", ""
-        repeats = layout.headers and all(map(str.__eq__, map(_plain, cells), map(_plain, layout.headers)))
+        repeats = [_plain(cell) for cell in cells] == [_plain(name) for name in layout.headers]
         return ("names", str(number + 1)) if repeats else ("keep", "")
 
     def _comment(self, cells: list[str], number: int) -> _Verdict:

@@ -8,14 +8,23 @@ from data.began import began, since_1970
 from data.csv.clocks import clocks_of, on_clock, time_column
 from data.csv.dialect import sniff
 from data.csv.log import CsvTable, elapsed, find_column, read_csv, table_integrity
-from data.doors.door import Door, Logged, after_first, interval, require_sane_clock, require_unit, unset
+from data.doors.door import (
+    Door,
+    Logged,
+    after_first,
+    interval,
+    plain_clock,
+    require_sane_clock,
+    require_unit,
+    unset,
+)
 from data.elapsed import unset_lead
 from data.findings import Finding, LogError, Severity
 from data.mcap.records import ByteArray
 from data.names import shown
 from data.recording import Axis
 from data.signals import Signal
-from data.units import known_unit, same_unit
+from data.units import same_unit
 
 
 def read_csv_log(door: Door, content: ByteArray) -> Logged:
@@ -28,8 +37,7 @@ def read_csv_log(door: Door, content: ByteArray) -> Logged:
         }
         asked = door.signals.time
         column = time_column(layout, asked.source if asked else None, columns["position"])
-        unit = layout.units[column]
-        time = asked or Signal(column, unit=unit if known_unit(unit or "") else None)
+        time = asked or plain_clock(column, layout.units[column])
         clocks = clocks_of(layout, columns, column)
         for quantity, signal in wanted.items():
             require_unit(quantity, signal, layout.units[columns[quantity]], axis=door.axis)

@@ -16,8 +16,6 @@ from data.signals import Signal, Signals, log_format
 from data.units import Quantity, known_unit, same_unit, si_word, unknown_unit
 
 FloatArray = NDArray[np.float64]
-
-
 _LATEST: Final = 1e11  # [s] that a clock counts from a date: the year 5138; Windows counts from 1601
 _YEAR: Final = 3.156e7  # [s]
 _SMALLER: Final = (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9))
@@ -88,6 +86,11 @@ def unset(door: Door, lead: int, clock: str) -> tuple[Finding, ...]:
         "before it ran, so that their instant is not known; they are left out"
     )
     return (Finding("E-CLOCK", Severity.WARN, text, door.log),)
+
+
+def plain_clock(place: int, declared: str | None) -> Signal:
+    """The time where the campaign names none: a column in the unit that it declares, if that is known."""
+    return Signal(place, unit=declared if declared and known_unit(declared) else None)
 
 
 def require_unit(quantity: Quantity, signal: Signal, declared: str | None, *, axis: Axis) -> None:

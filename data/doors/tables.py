@@ -8,7 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from data.began import began
-from data.doors.door import Door, FloatArray, Logged, interval, require_sane_clock, require_unit, unset
+from data.doors.door import (
+    Door,
+    FloatArray,
+    Logged,
+    interval,
+    plain_clock,
+    require_sane_clock,
+    require_unit,
+    unset,
+)
 from data.elapsed import unset_lead
 from data.findings import LogError
 from data.mat.log import MatLog
@@ -17,7 +26,7 @@ from data.names import shown
 from data.parquet.log import ParquetLog
 from data.signals import Signal, log_format
 from data.tables.table import TIME_NAMES, Column, TableFile, Values, require_numbers
-from data.units import Quantity, known_unit
+from data.units import Quantity
 
 
 def read_parquet_log(door: Door, content: ByteArray) -> Logged:
@@ -87,8 +96,7 @@ def _places(
             f"[signals] names no time for {kind} logs, and no column is plainly the time "
             f'(one of {", ".join(TIME_NAMES)}); add time = {{ {kind} = "..." }}'
         )
-    unit = table.columns[place].unit
-    return Signal(place, unit=unit if known_unit(unit or "") else None), places | {"time": place}
+    return plain_clock(place, table.columns[place].unit), places | {"time": place}
 
 
 def _clocks(table: TableFile, wanted: Mapping[Quantity, Signal]) -> dict[Quantity, int]:

@@ -38,9 +38,8 @@ class Endings:
         if end - begin > _LONGEST_STATISTICS:
             raise Damage(begin, f"statistics of {end - begin} bytes")
         self._statistics = self._content[begin:end].tobytes()
-        self._proofs.promised = Fields(memoryview(self._statistics), where=begin, record="statistics").number(
-            8
-        )
+        fields = Fields(memoryview(self._statistics), where=begin, record="statistics")
+        self._proofs.promised = fields.number(8)
 
     def end_data(self, begin: int) -> None:
         """Check the checksum of all that came before, where there is one."""

@@ -12,6 +12,7 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from data.mcap.field_path import FieldPath
 from data.mcap.json_scan import POWERS, take
 from data.mcap.layout import Layout, Leaf, Taken, place, stamp_places
+from data.mcap.layout_reader import shapes
 from data.mcap.records import ByteArray
 from data.mcap.stamp import LATEST, PLACES
 
@@ -30,7 +32,6 @@ _DEEPEST: Final = 32
 _PATH_SIGNS: Final = frozenset(".[]{}")
 _STAMPS: Final = tuple(".".join(way) for way in PLACES)
 _MOST_NUMBERS: Final = 4096
-_MOST_LAYOUTS: Final = 16
 
 
 @dataclass(frozen=True)
@@ -53,18 +54,9 @@ class JsonReader:
 
     def read(self, block: ByteArray, begin: NDArray[np.int64], length: NDArray[np.int64]) -> Taken:
         """What can be read of the messages (n,) at `begin`."""
-        taken, tried = Taken.nothing(len(self._paths), begin.size), 0
-        left = taken.left
-        while left.any() and tried < _MOST_LAYOUTS:
-            if tried == len(self._shapes):
-                k = int(np.argmax(left))
-                raw = block[int(begin[k]) : int(begin[k] + length[k])].tobytes()
-                shape = _shape_of(raw, self._paths)
-                if shape is None:
-                    break
-                self._shapes.append(shape)
-            shape = self._shapes[tried]
-            tried += 1
+        taken = Taken.nothing(len(self._paths), begin.size)
+        shown = partial(_shape_of, paths=self._paths)
+        for shape in shapes(self._shapes, shown, block, (begin, length), taken.left):
             take(
                 block,
                 begin,
@@ -78,7 +70,7 @@ class JsonReader:
                 np.empty(shape.slot.size, np.uint64),
                 np.empty(shape.slot.size, np.int64),
                 POWERS,
-                left,
+                taken.left,
                 taken.values,
                 taken.header,
             )
@@ -91,8 +83,6 @@ def _shape_of(raw: bytes, paths: Sequence[FieldPath]) -> _Shape | None:
     try:
         walk.value("", depth=0)
         json.loads(raw)  # what it refuses is no JSON, be its structure as it may
-        if raw[walk.at :].strip(b" \t\n\r"):
-            return None
     except (_UnlikeError, ValueError):
         return None
     none = np.empty(0, np.uint8)
@@ -102,13 +92,8 @@ def _shape_of(raw: bytes, paths: Sequence[FieldPath]) -> _Shape | None:
     if len(known) < len(paths):
         return None
     own_stamp = stamp_places(layout)
-    if own_stamp is None and any(path in walk.objects for path in _STAMPS):
-        return None
-    if (
-        own_stamp is not None
-        and _STAMPS[0] in walk.objects
-        and not any(path.startswith(f"{_STAMPS[0]}.") for path in walk.leaves)
-    ):
+    first = next((f"{path}." for path in _STAMPS if path in walk.objects), None)  # the one that counts
+    if first is not None and (own_stamp is None or not any(path.startswith(first) for path in walk.leaves)):
         return None
     wanted = [*known, *([] if own_stamp is None else (own.offset for own in own_stamp))]
     slot, rows = np.full(len(walk.numbers), -1, np.int64), []

@@ -101,9 +101,8 @@ def _digits(block: NDArray[np.uint8], at: Word, end: Word, w: Word) -> tuple[Wor
             break
         v = v - _ZEROS
         v = v * _U(10) + (v >> _U(8))
-        v = ((v & _PAIRS) * _U(0x000F424000000064) + ((v >> _U(16)) & _PAIRS) * _U(0x0000271000000001)) >> _U(
-            32
-        )
+        v = (v & _PAIRS) * _U(0x000F424000000064) + ((v >> _U(16)) & _PAIRS) * _U(0x0000271000000001)
+        v = v >> _U(32)
         w = w * _U(100_000_000) + v
         at += _U(8)
     while at < end and 48 <= block[at] <= 57:

@@ -25,6 +25,7 @@ FloatArray = NDArray[np.float64]
 Fixed = Literal["f4", "f8", "i1", "i2", "i4", "i8", "u1", "u2", "u4", "u8"]  # little-endian
 Variable = Literal["int32", "uint32", "sint32", "int64", "uint64", "sint64"]  # seven bits a byte, as protobuf
 Kind = Fixed | Variable
+_FIXED: Final = frozenset(get_args(Fixed))
 _WORD: Final = 8  # [bytes] that compiled code compares at once
 KINDS: Final[tuple[Kind, ...]] = (*get_args(Fixed), *get_args(Variable))  # in the order of `scan`
 
@@ -147,7 +148,7 @@ def take(
     """
     own = layout.stamp
     if compiled and layout.size >= _WORD:
-        from data.mcap import scan  # noqa: PLC0415  # see `records.tile`
+        from data.mcap import scan  # noqa: PLC0415  # numba takes long to load
 
         scan.take(
             block,
@@ -207,7 +208,7 @@ def _stored(block: ByteArray, begin: NDArray[np.int64], where: Place) -> NDArray
     if not where.width:
         return np.zeros(begin.size, np.int64)
     rows = np.ascontiguousarray(gather(block, begin + where.offset, where.width))
-    if where.kind in get_args(Fixed):
+    if where.kind in _FIXED:
         return rows.view(f"<{where.kind}").reshape(-1)
     value = np.zeros(begin.size, np.uint64)
     for k in range(where.width):

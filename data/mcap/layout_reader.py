@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Final
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,29 @@ from data.mcap.layout import Layout, Place, Taken, place, take
 from data.mcap.records import ByteArray
 
 Recognise = Callable[[bytes], Layout | None]
-_MOST_LAYOUTS: Final = 16  # of one channel, before its messages are decoded one by one
+S = TypeVar("S")
+MOST_SHAPES: Final = 16  # of one channel's messages, before these are decoded one by one
+
+
+def shapes(
+    known: list[S],
+    shown: Callable[[bytes], S | None],
+    block: ByteArray,
+    messages: tuple[NDArray[np.int64], NDArray[np.int64]],
+    left: NDArray[np.bool_],
+) -> Iterator[S]:
+    """Shapes to read messages by while some are `left` (n,): those that are known, then those they show."""
+    begin, length = messages
+    for tried in range(MOST_SHAPES):
+        if not left.any():
+            return
+        if tried == len(known):
+            k = int(np.argmax(left))
+            shape = shown(block[int(begin[k]) : int(begin[k] + length[k])].tobytes())
+            if shape is None:
+                return
+            known.append(shape)
+        yield known[tried]
 
 
 class LayoutReader:
@@ -27,16 +49,8 @@ class LayoutReader:
 
     def read(self, block: ByteArray, begin: NDArray[np.int64], length: NDArray[np.int64]) -> Taken:
         """What can be read of the messages (n,) at `begin`."""
-        taken, tried = Taken.nothing(len(self._paths), begin.size), 0
-        while taken.left.any() and tried < _MOST_LAYOUTS:
-            if tried == len(self._layouts):
-                k = int(np.argmax(taken.left))
-                known = self._known(block[int(begin[k]) : int(begin[k] + length[k])].tobytes())
-                if known is None:
-                    break
-                self._layouts.append(known)
-            layout, places = self._layouts[tried]
-            tried += 1
+        taken = Taken.nothing(len(self._paths), begin.size)
+        for layout, places in shapes(self._layouts, self._known, block, (begin, length), taken.left):
             if np.any(length == layout.size):
                 take(layout, places, block, (begin, length), taken, compiled=self._compiled)
         return taken

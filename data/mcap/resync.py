@@ -143,7 +143,7 @@ def disguised(content: ByteArray, begin: int, end: int) -> bool:
 def exact(content: ByteArray, opcode: int, begin: int, end: int) -> bool:
     """Whether the lengths within a record's content [begin, end) add up to its own."""
     raw = content[begin:end].data
-    if opcode not in LEAST or len(raw) < LEAST[opcode]:
+    if len(raw) < LEAST.get(opcode, len(raw) + 1):
         return False
     if opcode == Opcode.STATISTICS:
         return len(raw) == LEAST[opcode] + int.from_bytes(raw[42:46], "little")
@@ -158,6 +158,8 @@ def exact(content: ByteArray, opcode: int, begin: int, end: int) -> bool:
             return read_channel(raw, where=begin)[1] == len(raw)
         if opcode == Opcode.METADATA:
             return read_metadata(raw, where=begin, most=MOST_METADATA)[1] == len(raw)
+        if opcode not in _PARTS:
+            return False
         for size in _PARTS[opcode]:
             if size:
                 fields.number(size)

@@ -15,8 +15,6 @@ _FORMATS: Final = {
     "uint64": "Q", "float32": "f", "float64": "d", "byte": "b", "char": "B",
 }  # fmt: skip
 _WIDTHS: Final = {**NUMBERS, "byte": 1, "char": 1}
-
-
 MOST_ELEMENTS: Final = 100_000  # of one message that are made one by one: texts, times, messages
 
 

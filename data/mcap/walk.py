@@ -27,7 +27,7 @@ from data.mcap.ahead import Unpacking
 from data.mcap.attachments import AttachmentLabel, read_attachment
 from data.mcap.chunks import extent, read_head
 from data.mcap.container import MAGIC
-from data.mcap.credible import Surroundings, follows, message_begins, surroundings
+from data.mcap.credible import LEAST, Surroundings, follows, message_begins, surroundings
 from data.mcap.declarations import Declarations
 from data.mcap.endings import Endings
 from data.mcap.fields import Fields, read_metadata
@@ -49,11 +49,9 @@ _HINTS: Final = (
     Opcode.METADATA_INDEX,
     Opcode.SUMMARY_OFFSET,
 )
-_INDEX_HEAD: Final = 6  # [bytes] channel and size
 _UNKNOWN: Final = 16  # opcodes from here on mean nothing yet
 _PASSED: Final = frozenset({*map(int, _HINTS), *range(_UNKNOWN, 256)})  # not needed here, or not known
 _EMPTIEST: Final = 256  # [bytes] that a record of an empty chunk may take
-_FOOTER_LENGTH: Final = 20  # [bytes]
 _AHEAD: Final = 4 << 20  # [bytes] of a file that is worth a thread
 _SMALLEST_DISGUISED: Final = MESSAGE_PREFIX  # [bytes]
 _MOST_DISGUISED: Final = 10_000  # of a stretch that are looked through
@@ -76,6 +74,8 @@ class McapWalk:
     `schemas` and `channels` hold all that a block needs by the time it is handed out.
     """
 
+    _unpacking: Unpacking  # while there are blocks to come
+
     def __init__(self, content: ByteArray, *, compiled: bool) -> None:
         self.metadata: list[Metadata] = []
         self.attachments: list[AttachmentLabel] = []
@@ -87,7 +87,6 @@ class McapWalk:
         self._seeker = Seeker(content)
         self._proofs = Proofs()
         self._endings = Endings(content, self._proofs)
-        self._unpacking = Unpacking(content, ahead=False)
         self._entries = 0  # of metadata
         self._metadata_bytes = 0
         self._loose = False  # whether messages stand outside chunks
@@ -177,7 +176,7 @@ class McapWalk:
         if opcode in _PASSED:
             return None, self._pass_over(here), False
         if opcode == Opcode.FOOTER:
-            if length != _FOOTER_LENGTH:
+            if length != LEAST[Opcode.FOOTER]:
                 raise Damage(here, f"a footer of {length} bytes")
             self._endings.footer(begin, end)
             return None, end, True
@@ -299,16 +298,7 @@ class McapWalk:
     def _pass_over(self, here: int) -> int:
         """Pass over indexes, and records of unknown opcodes; where to go on."""
         content = self._content
-        tiling = tile(content, begin=here, within=_PASSED, compiled=self.compiled)
-        false = _false_index(content, tiling)
-        if false == 0:
-            end = int(tiling.begin[0] + tiling.length[0])
-            known = end < content.size and int(content[end]) < _UNKNOWN
-            why = "an index of messages whose lengths do not add up"
-            raise Damage(here, why, resume=self._if_followed(end) if known else None)
-        if false is not None:
-            end = int(tiling.begin[false]) - HEADER.size
-            tiling = Tiling(tiling.opcode[:false], tiling.begin[:false], tiling.length[:false], end)
+        tiling = self._to_false_index(tile(content, begin=here, within=_PASSED, compiled=self.compiled))
         near = self._near()
         starts = tiling.begin - HEADER.size
         large = np.flatnonzero(tiling.length >= _SMALLEST_DISGUISED)[:_MOST_DISGUISED]
@@ -326,6 +316,19 @@ class McapWalk:
             return tiling.end
         self._suspect = begin - HEADER.size
         return self._suspect
+
+    def _to_false_index(self, tiling: Tiling) -> Tiling:
+        """Records up to the first index of messages of a false length; Damage where that is the first."""
+        false = _false_index(self._content, tiling)
+        if false is None:
+            return tiling
+        begin = int(tiling.begin[false]) - HEADER.size
+        if false:
+            return Tiling(tiling.opcode[:false], tiling.begin[:false], tiling.length[:false], begin)
+        end = int(tiling.begin[0] + tiling.length[0])
+        known = end < self._content.size and int(self._content[end]) < _UNKNOWN
+        why = "an index of messages whose lengths do not add up"
+        raise Damage(begin, why, resume=self._if_followed(end) if known else None)
 
     def _record(self, opcode: int, begin: int, end: int) -> None:
         content = self._content[begin:end]
@@ -381,9 +384,10 @@ class McapWalk:
 
 def _false_index(content: ByteArray, tiling: Tiling) -> int | None:
     """The first index of messages that is shorter than it says, or longer with no known record behind it."""
-    mine = np.flatnonzero((tiling.opcode == Opcode.MESSAGE_INDEX) & (tiling.length >= _INDEX_HEAD))
+    least = LEAST[Opcode.MESSAGE_INDEX]
+    mine = np.flatnonzero((tiling.opcode == Opcode.MESSAGE_INDEX) & (tiling.length >= least))
     size = gather(content, tiling.begin[mine] + 2, 4).copy().view("<u4").reshape(-1)
-    more = tiling.length[mine] - _INDEX_HEAD - size.astype(np.int64)
+    more = tiling.length[mine] - least - size.astype(np.int64)
     behind = content[np.minimum(tiling.begin[mine] + tiling.length[mine], content.size - 1)]
     false = mine[(more < 0) | ((more > 0) & ((behind >= _UNKNOWN) | (behind == 0)))]
     return int(false[0]) if false.size else None
