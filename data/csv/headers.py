@@ -100,11 +100,10 @@ def read_above(
     if header is not False and paired is not None:
         _read_pairs(found, rows[paired:])
         above, rows = above[:paired], rows[:paired]
+    rows = [_trimmed(row, columns, open_end=open_end) for row in rows]
     nearest = len(above) - 1  # where names may be commented out
     for k in range(len(above) - 1, -1, -1):
-        record, row = above[k], _trimmed(rows[k], columns)
-        if open_end and len(row) == columns - 1:
-            row.append("")
+        record, row = above[k], rows[k]
         if not any(row) or record.text.startswith((LABVIEW_END, "sep=")):
             continue
         if record.commented(marks):
@@ -135,12 +134,15 @@ def read_above(
     return found
 
 
-def _trimmed(row: Sequence[str], columns: int) -> list[str]:
-    """A row without the empty cells behind its last column, and without LabVIEW's column of comments."""
+def _trimmed(row: Sequence[str], columns: int, *, open_end: bool = False) -> list[str]:
+    """A row without the empty cells behind its last column, and without LabVIEW's column of comments.
+
+    With `open_end`, the empty cell that the rows of numbers end with is added where it is missing.
+    """
     cells = list(row)
     while len(cells) > columns and cells[-1].lower() in {"", "comment"}:
         cells.pop()
-    return cells
+    return [*cells, ""] if open_end and len(cells) == columns - 1 else cells
 
 
 def _is_units(
@@ -155,10 +157,11 @@ def _is_units(
     known = sum(known_unit(word) is not None for word in words)
     if len(row) != columns or known < 2 or 2 * known < len(words) or not above:
         return False
-    names = _trimmed(above[-1], columns)
+    names = [name for name in above[-1] if name]
     return (
-        len(names) == columns
-        and all(name and not is_number(name, ".") and not is_number(name, ",") for name in names)
+        len(above[-1]) == columns
+        and len(names) >= len(words)
+        and not any(is_number(name, ".") or is_number(name, ",") for name in names)
         and not any(known_unit(name) for name in names if len(name) > 1)
     )
 

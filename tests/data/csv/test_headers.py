@@ -43,6 +43,15 @@ def test_a_delimiter_behind_every_row_makes_no_name_wrong() -> None:
         sniff(content.replace("-3;", "-3;7").encode())
 
 
+def test_units_that_are_not_known_and_open_rows_come_together() -> None:
+    rows = "".join(f"27.11.2026 23:59:{k + 10},5;{k},5;-{k},25;\n" for k in range(30))
+    content = "# speed: 1\nZeit;Winkel;Moment\nUhr;arcmin;N·mm\nREAL;REAL;REAL\n" + rows
+    layout = sniff(content.encode("latin-1"))
+    assert layout.headers == ("Zeit", "Winkel", "Moment", "")
+    assert layout.units == ("Uhr", "arcmin", "N·mm", None)
+    assert layout.metadata["speed"] == "1"
+
+
 def test_labview_s_units_are_those_of_its_channels() -> None:
     head = "LabVIEW Measurement\nSeparator\tTab\nX_Columns\tOne\n***End_of_Header***\n"
     head += "Channels\t2\nY_Unit_Label\tdeg\tN m\nDelta_X\t0.001\t0.001\n***End_of_Header***\n"
